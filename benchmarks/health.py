@@ -1,155 +1,131 @@
 """Print the health figures of captures as they are and of the same captures spoiled.
 
-python benchmarks/health.py captures/ -o out/
+python benchmarks/health.py captures/ -o out/ > figures.md
 
-The thresholds of `hairkit.pipeline.health` are chosen from this table.
+The thresholds of `hairkit.pipeline.health` are chosen from this table, `docs/health_figures.md`.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
-import shutil
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-import cv2
-import numpy as np
+import spoiled
 from captures_argument import NO_CAPTURES, add_captures
+from spoiled import GROOMS, RUNS, Files, curled
 
 from hairkit.errors import HairkitError
+from hairkit.io.capture_reader import read_capture
 from hairkit.manager import Manager
-from hairkit.pipeline.recipe import load_recipe
+from hairkit.pipeline.figure import AMBER, GREEN, RED, Figure
+from hairkit.pipeline.find_views import frame_photos
+from hairkit.pipeline.health import assess_drawing
+from hairkit.pipeline.recipe import Recipe, load_recipe
 from hairkit.pipeline.reconstruct import reconstruct
 from hairkit.pipeline.run_record import RECORD, read_record
+from hairkit.pipeline.work_folder import WORK, LastRun
 from hairkit.progress import Silent
+from hairkit.stages import FRAMED, TURN
+from hairkit.types.groom import Groom
 
 GUIDES = 600
-
-SHUFFLE_SEED = 3
-"""Of the permutation of the photos of `shuffled`."""
-SHIFT = 0.08
-"""Share of the width by which every other mask of `masks_shifted` is moved."""
-WRONG_STEP_DEG = 25.0
-"""Step between the azimuths of `wrong_azimuths`, whose true steps are 45 degrees."""
+COLUMNS = {
+    "margin over the next best": "margin",
+    "landmarks off by": "landmarks, mm",
+    "outlines off by": "outlines, mm",
+    "hair that all views agree on, worst view": "views agree",
+    "overlap with the masks": "hull",
+    "face called hair": "face",
+    "directions as photographed": "directions",
+    "direction of curly hair": "curly",
+    "drawn where no photo has hair": "astray",
+    "hair left bare": "bare",
+}
+"""Headings of the figures that have a column; others are named where they are not green."""
+DRAWN = [*COLUMNS][-4:]
+"""Figures of the guides that are drawn."""
+ALONE = "photos alone"
+GOOD = (ALONE, "with masks")
 
 
 @dataclass(frozen=True)
-class Files:
-    """The files of a capture, one entry a view in the order of the turn."""
+class Bench:
+    """Runs of all captures, spoiled in all ways."""
 
-    photos: list[Path]
-    masks: list[Path | None]
-    landmarks: dict[int, Any]
-    """68 points by the number of the view."""
-    toml: str = ""
+    folders: list[Path]
+    out: Path
+    manager: Manager
+    recipe: Recipe
+    guides: int
+    done: set[Path] = field(default_factory=set)
 
-    @classmethod
-    def of(cls, folder: Path) -> Files:
-        """Return the files of a capture's folder."""
-        photos = sorted((folder / "photos").iterdir())
-        masks = [folder / "masks" / f"{photo.stem}.png" for photo in photos]
-        stems = {name: index for index, photo in enumerate(photos) for name in _names(photo)}
-        path = folder / "landmarks.json"
-        points = json.loads(path.read_text())["views"] if path.is_file() else {}
-        landmarks = {stems[name]: value for name, value in points.items()}
-        toml = folder / "capture.toml"
-        return cls(
-            photos,
-            [mask if mask.is_file() else None for mask in masks],
-            landmarks,
-            toml.read_text() if toml.is_file() else "",
+    def figures(self, way: str, index: int) -> Sequence[Figure]:
+        """Return the figures of a capture spoiled in a way; none where nothing can be."""
+        groom = Groom.load(self.run(ALONE, index) / "groom.npz")
+        curly = groom.material.curl_radius > 0
+        if way in GROOMS:
+            spoiled_groom = GROOMS[way](groom)
+            return () if curly and GROOMS[way] is curled else self._redrawn(index, spoiled_groom)
+        if RUNS[way].curly and not curly:
+            return ()
+        return read_record(self.run(way, index) / RECORD).health
+
+    def told(self, way: str, index: int) -> bool:
+        """Return whether a figure is worse than those of the same run with nothing spoiled."""
+        good = ALONE if way in GROOMS or "turn=none" not in RUNS[way].settings else "with masks"
+        had, has = (
+            {(f.name, f.light) for f in self.figures(each, index) if f.light != GREEN}
+            for each in (good, way)
         )
+        return bool(has - had)
 
-    def write(self, folder: Path) -> Path:
-        """Write a capture whose files are named `0`, `1`, ... in the order of the turn."""
-        shutil.rmtree(folder, ignore_errors=True)
-        for name in ("photos", "masks"):
-            (folder / name).mkdir(parents=True)
-        for index, (photo, mask) in enumerate(zip(self.photos, self.masks, strict=True)):
-            shutil.copyfile(photo, folder / "photos" / f"{index}{photo.suffix}")
-            if mask is not None:
-                shutil.copyfile(mask, folder / "masks" / f"{index}.png")
-        views = {str(index): points for index, points in self.landmarks.items()}
-        if views:
-            (folder / "landmarks.json").write_text(json.dumps({"views": views}))
-        if self.toml:
-            (folder / "capture.toml").write_text(self.toml)
-        return folder
+    def run(self, way: str, index: int) -> Path:
+        """Reconstruct a capture, once, and return the folder of the results."""
+        folder = self.out / way.replace(" ", "_") / self.folders[index].name
+        if folder not in self.done:
+            files = (self._files(way, k % len(self.folders)) for k in (index, index + 1))
+            capture = RUNS[way].spoil(*files, folder / "capture")
+            recipe = self.recipe.with_set(["export=none", *RUNS[way].settings])
+            reconstruct(
+                capture, folder / "out", recipe, self.manager,
+                guides=self.guides, sheet=False, progress=Silent(),
+            )  # fmt: skip
+            self.done.add(folder)
+        return folder / "out"
 
-    def picked(self, order: list[int]) -> Files:
-        """Return the views in another order, each with its mask and landmarks."""
-        landmarks = {
-            new: self.landmarks[old] for new, old in enumerate(order) if old in self.landmarks
-        }
-        photos, masks = ([each[i] for i in order] for each in (self.photos, self.masks))
-        return Files(photos, masks, landmarks, self.toml)
+    def _files(self, way: str, index: int) -> Files:
+        """Return the files of a capture, in the order of the turn where that is not looked for."""
+        files = Files.of(self.folders[index])
+        if "turn=none" not in RUNS[way].settings:
+            return files
+        return files.picked(LastRun(self.run(ALONE, index) / WORK).latest(TURN).order.tolist())
 
-
-def _names(photo: Path) -> tuple[str, ...]:
-    return photo.stem, photo.stem.split("_", 1)[-1]
-
-
-def as_they_are(own: Files, other: Files, folder: Path) -> Path:
-    """Nothing is spoiled."""
-    return own.write(folder)
-
-
-def shuffled(own: Files, other: Files, folder: Path) -> Path:
-    """The photos are in no order."""
-    order = np.random.default_rng(SHUFFLE_SEED).permutation(len(own.photos)).tolist()
-    return own.picked(order).write(folder)
+    def _redrawn(self, index: int, groom: Groom) -> tuple[Figure, ...]:
+        """Return the figures of a run with photos alone after its guides were exchanged."""
+        out = self.run(ALONE, index)
+        last = LastRun(out / WORK)
+        capture = frame_photos(read_capture(out.parent / "capture"), last.latest(FRAMED))
+        capture, scene = capture.arranged(last.latest(TURN)), last.latest(last.scene)
+        masks = last.masks(scene.names)
+        assert masks is not None
+        drawn = assess_drawing(capture, masks, scene, groom)
+        old = read_record(out / RECORD).health
+        return (*(f for f in old if f.name not in DRAWN), *drawn)
 
 
-def two_heads(own: Files, other: Files, folder: Path) -> Path:
-    """Every other photo shows another head."""
-    parts = [own if index % 2 == 0 else other for index in range(len(own.photos))]
-    landmarks = {i: part.landmarks[i] for i, part in enumerate(parts) if i in part.landmarks}
-    photos = [part.photos[i] for i, part in enumerate(parts)]
-    masks = [part.masks[i] for i, part in enumerate(parts)]
-    return Files(photos, masks, landmarks, own.toml).write(folder)
+def row(name: str, figures: Sequence[Figure]) -> str:
+    """Return a row of the table: values with their lights where they are not green."""
+    known = {figure.name: _cell(figure) for figure in figures}
+    rest = [f for f in figures if f.name not in COLUMNS and f.light != GREEN]
+    others = "; ".join(f"{f.stage}: {f.name} {_cell(f)}" for f in rest)
+    return f"| {name} | {' | '.join(known.get(c, '') for c in COLUMNS)} | {others} |"
 
 
-def masks_shifted(own: Files, other: Files, folder: Path) -> Path:
-    """Every other mask is moved sideways."""
-    written = own.write(folder)
-    for path in sorted((written / "masks").iterdir())[::2]:
-        labels: Any = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
-        cv2.imwrite(str(path), np.roll(labels, round(SHIFT * labels.shape[1]), axis=1))
-    return written
-
-
-def masks_of_the_head(own: Files, other: Files, folder: Path) -> Path:
-    """The face is marked as hair, as simple segmentation does with beards and bald heads."""
-    written = own.write(folder)
-    for path in sorted((written / "masks").iterdir()):
-        labels: Any = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
-        rows = np.flatnonzero((labels != 0).any(axis=1))
-        chin = rows[0] + (rows[-1] - rows[0]) // 2
-        labels[:chin][labels[:chin] != 0] = 255
-        cv2.imwrite(str(path), labels)
-    return written
-
-
-def wrong_azimuths(own: Files, other: Files, folder: Path) -> Path:
-    """The views are said to be 25 degrees apart."""
-    tables = "".join(
-        f'[[views]]\nname = "view {i}"\nphoto = "{i}{photo.suffix}"\n'
-        f"azimuth_deg = {WRONG_STEP_DEG * i}\n"
-        for i, photo in enumerate(own.photos)
-    )
-    return Files(own.photos, own.masks, own.landmarks, own.toml + tables).write(folder)
-
-
-WAYS: dict[str, Callable[[Files, Files, Path], Path]] = {
-    function.__name__: function
-    for function in (
-        as_they_are, shuffled, two_heads, masks_shifted, masks_of_the_head, wrong_azimuths,
-    )
-}  # fmt: skip
-"""How captures are spoiled, by the name in the table."""
+def _cell(figure: Figure) -> str:
+    light = {GREEN: "", AMBER: " amber", RED: " **red**"}[figure.light]
+    return f"{figure.value:.{figure.digits}f}{light}"
 
 
 def main() -> None:
@@ -157,7 +133,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     add_captures(parser)
     parser.add_argument("-o", "--out", type=Path, default=Path("health-out"))
-    parser.add_argument("--ways", nargs="+", choices=WAYS, default=list(WAYS))
+    parser.add_argument("--ways", nargs="+", choices=[*RUNS, *GROOMS], default=[*RUNS, *GROOMS])
     parser.add_argument("--recipe", default="default")
     parser.add_argument("--plugin", action="append", default=[], metavar="FILE")
     parser.add_argument("--guides", type=int, default=GUIDES)
@@ -166,31 +142,32 @@ def main() -> None:
         print(NO_CAPTURES)
         return
     manager = Manager.loaded(arguments.plugin)
-    # the photos are believed, so that the figures are those of wrong input, not of its refusal
-    recipe = load_recipe(arguments.recipe).with_set(["export=none", "turn=none"])
+    manager.register(spoiled, "nonsense")
     folders = sorted(path.parent for path in arguments.captures.glob("*/masks"))
-    headed = False
-    for way in arguments.ways:
-        for index, folder in enumerate(folders):
-            own, other = Files.of(folder), Files.of(folders[(index + 1) % len(folders)])
-            capture = WAYS[way](own, other, arguments.out / way / folder.name / "capture")
-            out = capture.parent / "out"
-            try:
-                reconstruct(
-                    capture, out, recipe, manager,
-                    guides=arguments.guides, sheet=False, progress=Silent(),
-                )  # fmt: skip
-            except HairkitError as error:
-                print(f"{way} {folder.name}: refused: {error}")
-                continue
-            figures = read_record(out / RECORD).health
-            if not headed:
-                names = " | ".join(f"{figure.stage}: {figure.name}" for figure in figures)
-                print(f"| capture | {names} |")
-                print(f"|---{'|---' * len(figures)}|")
-                headed = True
-            cells = " | ".join(f"{f.value:.{f.digits}f} {f.light}" for f in figures)
-            print(f"| {way} {folder.name} | {cells} |", flush=True)
+    recipe = load_recipe(arguments.recipe)
+    bench = Bench(folders, arguments.out, manager, recipe, arguments.guides)
+    silent = [name for way in arguments.ways for name in print_way(bench, way)]
+    print(f"\nSpoiled, and no light is worse: {', '.join(silent) or 'none'}.")
+
+
+def print_way(bench: Bench, way: str) -> list[str]:
+    """Print the table of a way, and return the captures that are spoiled and do not show it."""
+    print(
+        f"\n### {way[0].upper()}{way[1:]}\n\n| capture | {' | '.join(COLUMNS.values())} | others |"
+    )
+    print(f"|---|{'---|' * len(COLUMNS)}---|")
+    silent = []
+    for index, folder in enumerate(bench.folders):
+        try:
+            figures = bench.figures(way, index)
+        except HairkitError as error:
+            print(f"| {folder.name} | {'| ' * len(COLUMNS)}| refused: {error} |", flush=True)
+            continue
+        if figures:
+            print(row(folder.name, figures), flush=True)
+            if way not in GOOD and not bench.told(way, index):
+                silent.append(f"{folder.name} {way}")
+    return silent
 
 
 if __name__ == "__main__":

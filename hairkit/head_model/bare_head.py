@@ -31,12 +31,7 @@ def mark_bare_head(head: Head, camera: Camera) -> Float32Array:
     if not drawn.any():
         return np.zeros(depth.shape, np.float32)
     away, (row, column) = ndimage.distance_transform_edt(~drawn, return_indices=True)
-    metre = camera.focal / (1.0 if camera.model == "orthographic" else middle_depth(camera))
+    metre = camera.pixels_per_metre
     fade = np.clip((NONE - away / metre) / (NONE - FULL), 0, 1)
     marked = ((first & drawn)[row, column] * fade).astype(np.float32)
     return np.asarray(cv2.GaussianBlur(marked, (0, 0), max(POSE_BLUR * metre, 1e-3)), np.float32)
-
-
-def middle_depth(camera: Camera) -> float:
-    """Return the depth of the head frame's origin, metres, above 0."""
-    return max(float(camera.depth(np.zeros(3))), 1e-9)

@@ -16,7 +16,6 @@ from scipy.spatial import cKDTree
 
 from hairkit.arrays import Float64Array
 from hairkit.cameras.depth_raster import HEAD_TOLERANCE, depth_behind, head_depth
-from hairkit.head_model.bare_head import middle_depth
 from hairkit.types.camera import Camera
 from hairkit.types.hairline import Hairline
 from hairkit.types.mask import Mask
@@ -68,8 +67,7 @@ def _hair_at(camera: Camera, mask: Mask, vertices: Float64Array) -> Float64Array
     hair = cv2.resize(
         mask.hair.astype(np.float32), (camera.width, camera.height), interpolation=cv2.INTER_AREA
     )
-    scale = camera.focal / (1.0 if camera.model == "orthographic" else middle_depth(camera))
-    blurred = cv2.GaussianBlur(hair, (0, 0), max(POSE_BLUR * scale, 1e-3))
+    blurred = cv2.GaussianBlur(hair, (0, 0), max(POSE_BLUR * camera.pixels_per_metre, 1e-3))
     u, v = np.nan_to_num(camera.project(vertices)).T
     column = np.clip(u, 0, camera.width - 1).astype(np.int64)
     row = np.clip(v, 0, camera.height - 1).astype(np.int64)

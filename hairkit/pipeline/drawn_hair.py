@@ -33,9 +33,10 @@ PIECES, GUIDE_RADIUS, EDGE = 39, 0.003, 3
 taken off the hair: its edge has the direction of the outline."""
 BESIDE = 9
 """Pixels, twice of which half a guide may lie beside the hair of a mask."""
-LOCK, USUAL_GUIDES = 0.01, 600
+LOCK, LEAST_LOCK, LOCK_SHARE, USUAL_GUIDES = 0.01, 0.004, 0.25, 600
 """Radius in metres of the lock that a guide stands for, where there are so many guides; fewer stand
-for wider ones."""
+for wider ones. Within 4 cm of the head's outline locks have this share of the distance from it, but
+are not thinner than outlines are off: hair of 12 mm that lacks its outer 5 mm is bare there."""
 
 
 @dataclass(frozen=True)
@@ -51,9 +52,9 @@ class DrawnHair:
     shown: float
     """Length of all visible guides."""
     bare: int
-    """Pixels of the photo's hair far from all guides."""
-    hair: int
-    """Pixels of the photo's hair."""
+    """Pixels of the photo's hair without a guide nearby."""
+    standing: int
+    """Pixels of the photo's hair that stands out over the head's outline."""
     coherence: float
     """How much the photo's hair runs one way nearby, its median: 0 for no direction, up to 1."""
 
@@ -73,7 +74,11 @@ def compare_drawing(groom: Groom, camera: Camera, mask: Mask, photo: UInt8Array)
     coherence = float(np.median(sure[inner])) if inner.any() else 0.0
     judged = inner & (sure >= coherence)
     near = cv2.dilate(hair, np.ones((BESIDE, BESIDE), np.uint8)) > 0
-    places, way, bare = _visible(groom, small, hair > 0)
+    head, dense = head_depth(groom.head, small), groom.strands.resampled(4 * PIECES).points
+    surface = np.minimum(point_depth(small, dense, GUIDE_RADIUS), head)
+    places, way = _visible(groom, small, surface)
+    drawn = np.isfinite(point_depth(small, dense))
+    bare, standing = _bare(hair, drawn, np.isfinite(head), small, len(groom.strands))
     length, at = np.linalg.norm(way, axis=1), (places[:, 1], places[:, 0])
     gap = np.asarray(angle_between(np.arctan2(way[:, 1], way[:, 0]), angle[at]))
     told, along = judged[at], gap <= DIRECTION_LIMIT
@@ -83,26 +88,54 @@ def compare_drawing(groom: Groom, camera: Camera, mask: Mask, photo: UInt8Array)
         float(length[~near[at]].sum()),
         float(length.sum()),
         bare,
-        int(hair.sum()),
+        standing,
         coherence,
     )
 
 
-def _visible(groom: Groom, camera: Camera, hair: BoolArray) -> tuple[Int64Array, Float32Array, int]:
-    """Return pixels (N, 2) and ways (N, 2) of visible pieces of guides, and hair without any."""
+def _visible(
+    groom: Groom, camera: Camera, surface: Float32Array
+) -> tuple[Int64Array, Float32Array]:
+    """Return pixels (N, 2) and ways (N, 2) of the pieces of guides on the first surface (H, W).
+
+    The way of a wave is that of its axis: from half a pitch before a piece to half a pitch behind.
+    """
     points = groom.strands.resampled(PIECES + 1).points.reshape(-1, PIECES + 1, 3)
-    dense = groom.strands.resampled(4 * PIECES).points
-    surface = np.minimum(point_depth(camera, dense, GUIDE_RADIUS), head_depth(groom.head, camera))
-    start, end = (camera.project(p).reshape(-1, 2) for p in (points[:, :-1], points[:, 1:]))
-    places = np.nan_to_num(np.floor((start + end) / 2), nan=-1).astype(np.int64)
+    ends = camera.project(points)
+    middle = ((ends[:, :-1] + ends[:, 1:]) / 2).reshape(-1, 2)
+    places = np.nan_to_num(np.floor(middle), nan=-1).astype(np.int64)
     size = [camera.width, camera.height]
     inside = np.asarray(((places >= 0) & (places < size)).all(axis=1))
     column, row = (places * inside[:, None]).T
     depth = camera.depth((points[:, :-1] + points[:, 1:]) / 2).ravel()
     seen = inside & (depth <= surface[row, column] + HEAD_TOLERANCE)
-    lock = LOCK * max(1.0, np.sqrt(USUAL_GUIDES / max(len(groom.strands), 1)))
-    bare = hair & np.isinf(point_depth(camera, dense, lock))
-    return places[seen], (end - start)[seen].astype(np.float32), int(bare.sum())
+    half = PIECES * groom.material.curl_pitch / (2 * np.maximum(groom.strands.lengths(), 1e-9))
+    around = np.rint(half).astype(np.int64)[:, None]
+    first = np.maximum(np.arange(PIECES) - around, 0)
+    last = np.minimum(np.arange(1, PIECES + 1) + around, PIECES)
+    strand = np.arange(len(ends))[:, None]
+    way = (ends[strand, last] - ends[strand, first]) / (last - first)[..., None]
+    return places[seen], way.reshape(-1, 2)[seen].astype(np.float32)
+
+
+def _bare(
+    hair: UInt8Array, drawn: BoolArray, head: BoolArray, camera: Camera, guides: int
+) -> tuple[int, int]:
+    """Return the pixels of hair farther than a lock from those drawn, and those beside the head.
+
+    Wisps of less than `EDGE` pixels do not count.
+    """
+    whole = cv2.morphologyEx(hair, cv2.MORPH_OPEN, np.ones((EDGE, EDGE), np.uint8)) > 0
+    metre = camera.pixels_per_metre
+    off_head, off_guides = (
+        cv2.distanceTransform((~part).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5) / metre
+        for part in (head, drawn)
+    )
+    lock = np.where(head, LOCK, np.clip(LOCK_SHARE * off_head, LEAST_LOCK, LOCK))
+    wider = max(1.0, np.sqrt(USUAL_GUIDES / max(guides, 1)))
+    standing = whole & (off_head > LEAST_LOCK)
+    bare = whole & (head | standing) & (off_guides > wider * lock)
+    return int(bare.sum()), int(standing.sum())
 
 
 def photo_directions(

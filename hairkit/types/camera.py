@@ -92,6 +92,13 @@ class Camera(Stored):
         """Elevation of the camera seen from the head, positive above."""
         return float(np.degrees(np.arcsin(np.clip(-self.forward[1], -1, 1))))
 
+    @property
+    def pixels_per_metre(self) -> float:
+        """Size in pixels of a metre across at the head frame's origin."""
+        if self.model == "orthographic":
+            return self.focal
+        return self.focal / max(float(self.translation[2]), 1e-9)
+
     def to_camera(self, points: npt.ArrayLike) -> Float64Array:
         """Transform head-frame points (..., 3) to camera coordinates (..., 3), metres."""
         result: Float64Array = np.asarray(points, np.float64) @ self.rotation.T + self.translation

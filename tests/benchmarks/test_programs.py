@@ -18,7 +18,7 @@ from hairkit.cli import main as hairkit
 PROJECT = Path(__file__).parents[2]
 SHARED = {
     "captures_argument", "card_picture", "example_textures", "foreign_heads", "peer_cases",
-    "peer_surfaces", "peer_views", "peer_volumes", "plain_analogies", "random_hair",
+    "peer_surfaces", "peer_views", "peer_volumes", "plain_analogies", "random_hair", "spoiled",
 }  # fmt: skip
 """Modules that programs import."""
 FOLDERS = ("benchmarks", "studies")
@@ -45,7 +45,7 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
     ),
     "growth": ({}, ["CAPTURES/short", "--strands", "50", "--rounds", "1"]),
     "head_fit": ({"MIXINGS": 1, "ROUNDS": 2}, ["CAPTURES"]),
-    "health": ({"GUIDES": 30}, ["CAPTURES", "-o", "CAPTURES/health", "--ways", "as_they_are"]),
+    "health": ({"GUIDES": 30}, ["CAPTURES", "-o", "CAPTURES/health", "--ways", "cut to 0.6"]),
     "held_out": ({"GUIDES": 60, "MEASURED": 5}, ["CAPTURES"]),
     "helices": ({"COUNT": 10}, []),
     "looks": ({"GUIDES": 60}, ["CAPTURES", "-o", "CAPTURES/looks.jpg"]),

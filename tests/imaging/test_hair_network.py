@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -67,6 +69,27 @@ def test_a_convolution_equals_its_definition() -> None:
     window = x[:, 3:6, 1:4]
     assert result.shape == (len(kernels), 4, 4)
     assert np.allclose(result[:, 2, 1], (kernels * window).sum(axis=(1, 2, 3)) + bias, atol=1e-4)
+
+
+@pytest.mark.parametrize("size", [(160, 120), (90, 300), (1, 7), (1, 1)])
+def test_the_upper_middle_of_a_crop_is_seen_twice(
+    size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The answer there is the mean of both, elsewhere and without a crop that of the whole."""
+    height, width = size
+
+    def answer(image: np.ndarray, *_: object) -> np.ndarray:
+        whole = image.shape[:2] == size
+        return np.full((10, 10, 3) if whole else (12, 9, 3), 0.8 if whole else 0.4, np.float32)
+
+    monkeypatch.setattr(hair_network, "hair_probability", answer)
+    monkeypatch.setattr(hair_network, "_ANSWERS", {})
+    view = View("front", 0.0, photo(height, width))
+    assert (find_hair(view) == np.float32(0.8)).all()
+    found = find_hair(replace(view, cropped=(5, 5, 5 + width, 5 + height), photo_size=(400, 400)))
+    assert np.allclose(found[:9, 1:9], 0.8 if size == (1, 1) else 0.6)
+    assert np.allclose(found[9], 0.8)
+    assert np.allclose(found[:, [0, 9]], 0.8)
 
 
 def test_an_answer_is_remembered_by_what_was_asked(monkeypatch: pytest.MonkeyPatch) -> None:

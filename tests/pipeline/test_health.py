@@ -15,6 +15,7 @@ from ball import ball_evidence
 
 from hairkit.cameras.depth_raster import mesh_depth
 from hairkit.grooming.densify import densify
+from hairkit.grooming.wind_waves import add_waves
 from hairkit.head_model.template import default_head
 from hairkit.manager import Manager
 from hairkit.pipeline.figure import GREEN, RED, Figure, Limits
@@ -31,6 +32,7 @@ from hairkit.types.strands import Strands
 from hairkit.types.tie import Tail, Tie, TiedHair
 from hairkit.types.turnaround import Turnaround
 from hairkit.types.volume import Hull
+from hairkit.types.waves import Waves
 
 WIDTH, HEIGHT = 360, 480
 HAIR_SIZE = 1.25
@@ -286,10 +288,28 @@ def test_curls_are_not_blamed_for_their_coils(run: Run) -> None:
     assert "strands: directions as photographed" not in run.figures()
 
 
+def test_waves_are_judged_along_their_axes(run: Run, good: Mapping[str, Figure]) -> None:
+    """Their windings count for nothing; axes across the directions in the photos are red."""
+    name, waves = "strands: directions as photographed", Waves(0.002, 0.03)
+    material = replace(run.groom.material, curl_radius=waves.radius, curl_pitch=waves.pitch)
+    run.groom = replace(run.groom, strands=add_waves(run.groom.strands, waves), material=material)
+    assert run.figures()[name].value == pytest.approx(good[name].value, abs=0.05)
+    combed_otherwise(run)
+    assert run.figures()[name].light == RED
+
+
 def test_a_beard_in_the_masks_is_red(run: Run) -> None:
     """The face includes cheeks and jaw."""
     beard(run)
     assert run.figures()["masks: face called hair"].light == RED
+
+
+def test_short_hair_of_half_its_length_is_not_green(run: Run) -> None:
+    """Hair that covers the head all the same is missed where it stands out over the outline."""
+    points = run.groom.strands.resampled(21).points.reshape(-1, 21, 3)[:, :11]
+    offsets = np.arange(len(points) + 1) * 11
+    run.groom = replace(run.groom, strands=Strands(points.reshape(-1, 3), offsets))
+    assert run.figures()["strands: hair left bare"].light != GREEN
 
 
 def test_limits_may_rise_or_fall() -> None:

@@ -89,6 +89,14 @@ def test_a_camera_at_90_degrees_stands_on_the_subjects_left() -> None:
     np.testing.assert_allclose(camera.position, [2, 0, 0], atol=1e-9)
 
 
+@pytest.mark.parametrize("model", ["perspective", "orthographic"])
+def test_a_metre_has_its_pixels_at_the_origin(model: CameraModel) -> None:
+    """The projection of a metre across is as long."""
+    camera = Camera.on_turn(30.0, distance=2.0, focal=100, width=60, height=80, model=model)
+    ends = camera.project([np.zeros(3), camera.rotation[0]])
+    assert camera.pixels_per_metre == pytest.approx(np.linalg.norm(ends[1] - ends[0]))
+
+
 def test_points_behind_a_perspective_camera_are_nowhere() -> None:
     """Their pixels are NaN, and the points in front are not touched by that."""
     camera = Camera.on_turn(0.0, distance=1.0, focal=100, width=60, height=80)
