@@ -26,7 +26,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hairkit.errors import HairkitError
+from hairkit.errors import HairkitError, one_line
 
 POLL_S = 0.05
 """Seconds between two looks at memory and output of a process that is at work."""
@@ -359,7 +359,7 @@ def resident_bytes(pid: int) -> int:
 
 def shortened(text: str) -> str:
     """Return a text in one line of at most `LONGEST_REASON` characters that can be printed."""
-    line = " ".join("".join(c if c.isprintable() else " " for c in text).split())
+    line = one_line(text)
     return line if len(line) <= LONGEST_REASON else f"{line[:LONGEST_REASON]}..."
 
 

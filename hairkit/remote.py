@@ -17,7 +17,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from hairkit.errors import HairkitError, InputError, MissingExtraError
+from hairkit.errors import HairkitError, InputError, MissingExtraError, one_line
 from hairkit.storage import MAX_FILE_BYTES
 from hairkit.storage import read_bytes as read_local
 from hairkit.storage import write_text as write_local
@@ -167,4 +167,4 @@ def _files(url: str | os.PathLike[str]) -> Iterator[tuple[Any, str]]:
 
 
 def _line(error: Exception) -> str:
-    return " ".join(str(error).split()) or type(error).__name__
+    return one_line(error) or type(error).__name__

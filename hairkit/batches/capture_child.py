@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hairkit import worker
-from hairkit.errors import HairkitError
+from hairkit.errors import HairkitError, one_line
 from hairkit.memory import keep_freed_memory
 from hairkit.progress import Silent
 
@@ -68,7 +68,7 @@ def explain(error: BaseException) -> str:
         named = f"{error.filename}: " if error.filename is not None else ""
         cure = "; free some space and run the batch again" if error.errno == errno.ENOSPC else ""
         return f"{named}{error.strerror or error}{cure}"
-    return " ".join(str(error).split())
+    return one_line(error)
 
 
 def _reconstruct(job: Job, settings: Settings, tell: Callable[[Any], None]) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from types import ModuleType
 from typing import Any, Literal
 
 from hairkit.manager import Manager
+from hairkit.manager.guard import describe_error
 from hairkit.nets.install import is_intact
 from hairkit.nets.known_models import KNOWN_MODELS
 from hairkit.nets.model_folder import model_folder
@@ -104,8 +105,9 @@ def _package(name: str) -> Finding:
         module = importlib.import_module(_MODULES.get(name, name.replace("-", "_")))
         version = _version(name, module)
     except Exception as error:  # a broken package may raise anything while it is imported
-        reason = " ".join(f"{type(error).__name__}: {error}".split())
-        return Finding(name, "FAIL", f"{reason}; pip install --force-reinstall {name}")
+        return Finding(
+            name, "FAIL", f"{describe_error(error)}; pip install --force-reinstall {name}"
+        )
     return Finding(name, "ok", version)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from hairkit.arrays import Float32Array
 from hairkit.cli.reader_settings import add_reader_arguments, reader_settings
 from hairkit.cli.settings import add_setting, split_settings
-from hairkit.errors import FormatError, InputError
+from hairkit.errors import FormatError, InputError, one_line
 from hairkit.types.groom import Groom
 from hairkit.types.point_cache import PointCache, is_cache_file
 
@@ -225,7 +225,7 @@ def _lines(facts: dict[str, Any], indent: str = "") -> list[str]:
         if not isinstance(value, dict):
             lines.append(f"{indent}{name}: {_format_value(value)}")
         elif any(isinstance(item, dict) for item in value.values()):
-            lines += [f"{indent}{name}:", *_lines(value, indent + "  ")]
+            lines += [f"{indent}{one_line(name)}:", *_lines(value, indent + "  ")]
         else:
             inner = ", ".join(f"{key} {_format_value(item)}" for key, item in value.items())
             lines.append(f"{indent}{name}: {inner}")
@@ -239,4 +239,4 @@ def _format_value(value: Any) -> str:
         return " to ".join(_format_value(item) for item in value)
     if isinstance(value, list):
         return f"({', '.join(str(item) for item in value)})"
-    return "unknown" if value is None else str(value)
+    return "unknown" if value is None else one_line(value)

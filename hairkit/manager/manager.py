@@ -19,9 +19,9 @@ from typing import Any
 import pluggy
 
 from hairkit import hookspecs
-from hairkit.errors import DataError, HairkitError, OptionError, PluginError
+from hairkit.errors import DataError, HairkitError, OptionError, PluginError, one_line
 from hairkit.manager.command_plugin import CommandPlugin, PluginCommand
-from hairkit.manager.guard import describe_error, guard_hook, one_line, quiet_stdout, subject
+from hairkit.manager.guard import describe_error, guard_hook, quiet_stdout, subject
 from hairkit.manager.loading import (
     DISABLE_AUTOLOAD,
     PluginInfo,

@@ -14,7 +14,7 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.errors import RenderError
+from hairkit.errors import RenderError, one_line
 from hairkit.rendering.osmesa import OSMesaContext
 
 REQUIRED_VERSION = 430
@@ -210,7 +210,7 @@ def _create() -> Renderer:
         try:
             context = _open(backend)
         except Exception as error:  # drivers fail in many ways; try the next backend
-            failures.append(f"{backend}: {' '.join(str(error).split())}")
+            failures.append(f"{backend}: {one_line(error)}")
         else:
             _owner = os.getpid()
             return Renderer(context, backend)

@@ -16,7 +16,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
-from hairkit.errors import HairkitError
+from hairkit.errors import HairkitError, one_line
 from hairkit.io.capture_toml import HeadEntry
 from hairkit.options import make_options, option
 from hairkit.storage import read_bytes
@@ -357,9 +357,7 @@ def _clear(handler: Handler) -> Handler:
         except HTTPException as error:
             return JSONResponse({"error": error.detail}, error.status_code, error.headers)
         except HairkitError as error:
-            return JSONResponse(
-                {"error": " ".join(str(error).split())}, HTTPStatus.UNPROCESSABLE_ENTITY
-            )
+            return JSONResponse({"error": one_line(error)}, HTTPStatus.UNPROCESSABLE_ENTITY)
 
     return answer
 

@@ -10,7 +10,7 @@ from functools import partial
 from typing import Any
 
 from hairkit import worker
-from hairkit.errors import HairkitError
+from hairkit.errors import HairkitError, one_line
 from hairkit.parallel import one_blas_thread
 
 
@@ -27,7 +27,7 @@ def _do(task: Callable[..., Any], request: dict[str, Any], tell: Callable[[Any],
     try:
         return {"made": task(request, tell)}
     except HairkitError as error:
-        return {"refused": " ".join(str(error).split())}
+        return {"refused": one_line(error)}
 
 
 if __name__ == "__main__":
