@@ -214,7 +214,9 @@ def _choose_kernel_cache() -> None:
         cache = os.path.dirname(cache)
     if "NUMBA_CACHE_DIR" in os.environ or any(os.access(p, os.W_OK) for p in (__path__[0], cache)):
         return
-    user = os.getuid() if hasattr(os, "getuid") else 0
+    from hairkit.system import user_id
+
+    user = user_id()
     folder = os.path.join(tempfile.gettempdir(), f"hairkit-kernels-{user}")
     try:
         os.makedirs(folder, stat.S_IRWXU, exist_ok=True)

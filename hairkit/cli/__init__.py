@@ -51,6 +51,7 @@ from collections.abc import Sequence
 from typing import Any, NoReturn
 
 from hairkit.errors import DivergedError, HairkitError, one_line
+from hairkit.system import utf8_name
 
 VERBS = {
     "reconstruct": "turn photos of a head, or a video, into a groom",
@@ -117,6 +118,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = [word for word in words if word != "--debug"]
     _log_to_stderr(logging.DEBUG if debug else logging.WARNING)
     try:
+        for word in words:
+            utf8_name(word)  # refused before any work
         return _run(words)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # so that the exit's flush stays quiet too

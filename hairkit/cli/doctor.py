@@ -23,6 +23,7 @@ from hairkit.manager.guard import describe_error
 from hairkit.nets.install import is_intact
 from hairkit.nets.known_models import KNOWN_MODELS
 from hairkit.nets.model_folder import model_folder
+from hairkit.system import gl_cure
 from hairkit.version import __version__
 
 _DESCRIPTION = """\
@@ -37,7 +38,6 @@ _MODULES = {"opencv-contrib-python-headless": "cv2"}
 _NO_CACHE = "no locator available"
 """Numba's message if it has no folder for compiled code."""
 
-_GL_CURE = "on Debian: apt-get install libegl1 libgl1 libgl1-mesa-dri libosmesa6"
 
 # Each backend gets a process of its own: only one can be loaded in a process, and drivers crash.
 _TRY_GL = """
@@ -136,7 +136,7 @@ def _graphics() -> Iterator[Finding]:
             yield Finding(f"OpenGL by {backend}", "ok", text)
         else:
             yield Finding(
-                f"OpenGL by {backend}", "note" if works else "FAIL", f"{text}; {_GL_CURE}"
+                f"OpenGL by {backend}", "note" if works else "FAIL", f"{text}; {gl_cure()}"
             )
 
 

@@ -28,6 +28,7 @@ from hairkit.pipeline.work_folder import WORK, WorkFolder, drop_work
 from hairkit.progress import Progress, Silent
 from hairkit.stages import EXPORT, ROWS
 from hairkit.stages import SHEET as SHEET_STAGE
+from hairkit.system import utf8_name
 from hairkit.types.capture import Capture
 from hairkit.types.evidence import Evidence
 from hairkit.types.groom import Groom
@@ -97,6 +98,7 @@ def reconstruct(
     OSError
         A file cannot be written. Files are written whole or not at all.
     """
+    utf8_name(Path(out).absolute())
     manager = manager or Manager.loaded()
     if not 1 <= guides <= MAX_GUIDES:
         raise InputError(f"{guides} guides, expected 1 to {MAX_GUIDES}")

@@ -24,6 +24,7 @@ from hairkit.pipeline.run_log import StageTime
 from hairkit.remote import is_url, join, read_bytes
 from hairkit.stages import OF_TABLE
 from hairkit.storage import read_text, write_text
+from hairkit.system import utf8_name
 from hairkit.types.capture import Capture
 from hairkit.types.parting import Parting, PartingWord
 from hairkit.version import __version__
@@ -138,10 +139,17 @@ def describe_run(
         What runs.
     guides, seed
         Of the roots.
+
+    Raises
+    ------
+    InputError
+        The name of an input is not UTF-8, so that no record can hold it.
     """
     head_file = head if isinstance(head, HeadFile) else None
     plugins = _plugins(recipe, manager)
     files = [*input_files(capture), *(head_file.files() if head_file else ()), *_named(plugins)]
+    for file in files:
+        utf8_name(file)  # names are written into records, which are UTF-8
     return RunRecord(
         hairkit=__version__,
         platform=platform.platform(),

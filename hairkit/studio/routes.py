@@ -164,7 +164,7 @@ class Routes:
         studio = self._studio
         incoming = await receive_file(request, studio.project.incoming, "video")
         video = incoming.with_suffix(".mp4")
-        incoming.rename(video)
+        incoming.replace(video)
         try:
             folder, name = str(studio.project.incoming), video.stem
             found = await studio.editor.call(

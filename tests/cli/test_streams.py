@@ -48,3 +48,18 @@ def test_info_shows_names_of_files_as_text(
     path.write_bytes(f"ply\nformat {HOSTILE} 1.0\n".encode(errors="surrogatepass"))
     assert main(["info", str(path)]) == 2
     assert capsys.readouterr().err.strip().isprintable()
+
+
+@pytest.mark.parametrize(
+    "words", [["reconstruct", "photos", "-o", "\udcffout"], ["export", "a.npz", "-o", "\udcff.glb"]]
+)
+def test_names_that_are_not_utf8_are_refused_at_once(
+    words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Before any work one line names the file, however its bytes are to be shown."""
+    assert main(words) == 2
+    assert (
+        capsys.readouterr().err
+        == f"hairkit: {ascii(words[-1])[1:-1]}: its name is not UTF-8;"
+        + (" rename the file or its folder\n")
+    )

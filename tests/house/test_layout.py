@@ -28,6 +28,7 @@ FLOORS = (
     (
         "version",
         "errors",
+        "system",
         "arrays",
         "colour",
         "options",

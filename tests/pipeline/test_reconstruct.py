@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -324,6 +325,23 @@ class Listener:
     @hookimpl
     def groom_ready(self, groom: Groom) -> None:
         self.heard.append(("groom", groom))
+
+
+@pytest.mark.parametrize("at_fault", ["out", "photo"])
+def test_names_that_are_not_utf8_are_refused_before_any_work(at_fault: str, tmp_path: Path) -> None:
+    """No stage runs and nothing is written, whether a photo or the results have such a name."""
+    bad = os.fsdecode(b"IMG\xff.jpg")
+    (tmp_path / bad).write_bytes(b"")
+    capture = turn_capture()
+    if at_fault == "photo":
+        first = replace(capture.views[0], photo_path=tmp_path / bad)
+        capture = replace(capture, views=(first, *capture.views[1:]))
+    out = tmp_path / "out" / (bad if at_fault == "out" else "x")
+    ball_plugin.CALLS.clear()
+    with pytest.raises(InputError, match="not UTF-8"):
+        run(out, capture=capture)
+    assert ball_plugin.CALLS == []
+    assert not out.parent.exists()
 
 
 def test_listeners_hear_every_stage_once(tmp_path: Path) -> None:
