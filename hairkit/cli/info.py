@@ -21,12 +21,13 @@ Example: hairkit info out/groom.npz
 
 Print what a file contains: a groom (.npz or what an import plugin reads; --scale, --up and --set
 give what bare strands do not define), a simulation (.npz), a scene.json, a head (.obj, .ply, .glb),
-hair cards (.glb, .vrm, .obj), or a capture: a folder, a video, a URL, or what else the recipe's
-stage `capture` takes. Lengths are in metres."""
+an avatar (.vrm), hair cards (.glb, .vrm, .obj), or a capture: a folder, a video, a URL, or what
+else the recipe's stage `capture` takes. Lengths are in metres."""
 
 _OWN = (".npz", ".json")
 """Files that need no libraries to be known."""
-_HEADS = (".obj", ".ply", ".glb")
+_AVATAR = ".vrm"
+_HEADS = (".obj", ".ply", ".glb", _AVATAR)
 _CARDS = (".glb", ".gltf", ".vrm", ".obj")
 
 
@@ -79,11 +80,13 @@ def _facts(path: Path, args: argparse.Namespace) -> dict[str, Any]:
     if path.suffix.lower() not in _HEADS:
         return _groom(path, args)
     try:
-        return _groom(path, args)
+        if path.suffix.lower() != _AVATAR:
+            return _groom(path, args)
     except FormatError:  # no strands in it, so it is a head
-        from hairkit.io.head_reader import read_head
+        pass
+    from hairkit.io.head_reader import read_head
 
-        return {"kind": "head", **_head(read_head(path, args.head_units, args.head_scalp))}
+    return {"kind": "head", **_head(read_head(path, args.head_units, args.head_scalp))}
 
 
 def _cards(path: Path) -> dict[str, Any] | None:

@@ -26,7 +26,7 @@ from hairkit.types.skin import Blendshape, SkinMaps
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 """Metres in one unit of a head file."""
-_READERS = {".obj": read_obj, ".ply": read_ply, ".glb": read_glb}
+_READERS = {".obj": read_obj, ".ply": read_ply, ".glb": read_glb, ".vrm": read_glb}
 _DEFAULT_BREADTH, _NARROWEST, _BROADEST = 0.155, 0.05, 0.6
 """Breadths in metres: the default head's, a doll's, a statue's; others are in another unit."""
 _OFF_CENTRE = 0.02
@@ -244,7 +244,7 @@ def _file_mesh(file: Path, units: str, up: str) -> FileMesh:
     if up not in ("y", "z"):
         raise InputError(f"the head's up axis is {up!r}, expected y or z")
     if file.suffix.lower() not in _READERS:
-        raise FormatError(f"{file}: a head must be an .obj, .ply or .glb file")
+        raise FormatError(f"{file}: a head must be an .obj, .ply, .glb or .vrm file")
     return _READERS[file.suffix.lower()](file)
 
 
