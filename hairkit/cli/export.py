@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from hairkit.cli.settings import add_setting, importer_of, split_settings
-from hairkit.cli.written import add_json, print_written
-from hairkit.errors import InputError
+from hairkit.cli.written import add_json, check_target, print_written
 from hairkit.manager import Manager
 from hairkit.pipeline.open_groom import load_groom, plugin_for
 
@@ -47,11 +46,3 @@ def run(args: argparse.Namespace) -> int:
     manager.call("export_groom", exporter, options, groom=groom, path=target)
     print_written(args, target)
     return 0
-
-
-def check_target(path: Path) -> None:
-    """Raise `InputError` if a file cannot be written there, before any work is done."""
-    if not path.parent.is_dir():
-        raise InputError(f"{path.parent}: no such folder; make it first")
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder; name a file")

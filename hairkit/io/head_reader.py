@@ -348,6 +348,25 @@ def _breadth_and_middle(
 
 def _landmarks(file: Path, vertices: Float64Array, units: str, up: str) -> Int32Array | None:
     """(68,) vertices named by, or nearest to the points in, NAME.landmarks.json."""
+    values = read_landmarks(file, len(vertices))
+    if values is None or values.ndim == 1:
+        return None if values is None else values.astype(np.int32)
+    points = _in_metres(values, units, up)
+    apart, nearest = cKDTree(vertices).query(points)
+    if apart.max() > _LANDMARK_GAP:
+        raise InputError(
+            f"{_beside(file, 'landmarks.json')}: a landmark is {1e3 * apart.max():.0f} mm from the"
+            " head; same units and axes?"
+        )
+    return np.asarray(nearest, np.int32)
+
+
+def read_landmarks(file: Path, count: int) -> Float64Array | None:
+    """Return the landmarks beside a mesh of `count` vertices, in NAME.landmarks.json.
+
+    They are (68,) numbers of vertices, or (68, 3) points in the file's unit and axes; None where
+    there is no such file. Raises `FormatError`, which names it, where it holds anything else.
+    """
     path = _beside(file, "landmarks.json")
     if not os.path.lexists(path):
         return None
@@ -359,17 +378,9 @@ def _landmarks(file: Path, vertices: Float64Array, units: str, up: str) -> Int32
         raise FormatError(f"{path}: not a JSON list of 68 landmarks ({error})") from error
     if values.shape not in ((68,), (68, 3)) or not np.isfinite(values).all():
         raise FormatError(f"{path}: expected 68 vertex numbers or 68 points, all finite")
-    if values.ndim == 1:
-        if (values % 1 != 0).any() or values.min() < 0 or values.max() >= len(vertices):
-            raise FormatError(f"{path}: a landmark names a vertex the head does not have")
-        return values.astype(np.int32)
-    points = _in_metres(values, units, up)
-    apart, nearest = cKDTree(vertices).query(points)
-    if apart.max() > _LANDMARK_GAP:
-        raise InputError(
-            f"{path}: a landmark is {1e3 * apart.max():.0f} mm from the head; same units and axes?"
-        )
-    return np.asarray(nearest, np.int32)
+    if values.ndim == 1 and ((values % 1 != 0).any() or values.min() < 0 or values.max() >= count):
+        raise FormatError(f"{path}: a landmark names a vertex the head does not have")
+    return values
 
 
 def _in_unit_square(uv: Float64Array) -> Float64Array:
