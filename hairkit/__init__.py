@@ -41,6 +41,7 @@ Every name below is loaded when it is first used, so that `import hairkit` takes
 * `remote`: files and folders at URLs
 * `stages`: the graph of stages as data
 * `storage`: safe files, frozen types as `.npz`
+* `system`: what Linux, macOS and Windows do differently
 * `testing`: a small head with hair for tests of plugins
 * `version`: the version of this package
 * `worker`: what plugins in environments of their own answer by
@@ -60,6 +61,7 @@ if TYPE_CHECKING:
     from hairkit.api import (
         evaluate,
         export,
+        export_for,
         read_groom,
         render,
         sample_capture,
@@ -129,6 +131,7 @@ __all__ = [
     "batch",
     "evaluate",
     "export",
+    "export_for",
     "hookimpl",
     "hookspec",
     "load_recipe",
@@ -148,6 +151,7 @@ _HOMES = {
     "api": (
         "evaluate",
         "export",
+        "export_for",
         "read_groom",
         "render",
         "sample_capture",

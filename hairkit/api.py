@@ -17,8 +17,10 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.errors import InputError
+from hairkit.grooming.engine_files import ENGINES
 from hairkit.io.capture_reader import TURN, WORKING_EDGE, read_capture, sample_folder
 from hairkit.manager import Manager
+from hairkit.options import unknown_name
 from hairkit.pipeline.open_groom import load_groom, plugin_for
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture
@@ -89,6 +91,42 @@ def export(
         checked = plugins.options(name, values)
         opened = _open(groom, plugins)
         plugins.call("export_groom", name, checked, groom=opened, path=Path(path))
+
+
+def export_for(
+    groom: Groom | StrPath, engine: str, folder: StrPath, *, manager: Manager | None = None
+) -> tuple[Path, ...]:
+    """Write what an engine takes into a folder and return the files, the hair first.
+
+    Format, axes, unit, guides or full hair, and names are those of the engine's page in the
+    documentation: `export_for(groom, "unreal", "unreal/")`.
+
+    Parameters
+    ----------
+    groom
+        A groom, or what `read_groom` reads.
+    engine
+        `unreal`, `unity`, `blender`, `maya`, `houdini`, `hairworks` or `web`.
+    folder
+        Made where there is none; files of the same names in it are replaced.
+
+    Raises
+    ------
+    InputError
+        There is no such engine, or a file is in the folder's place.
+    """
+    if engine not in ENGINES:
+        raise InputError(unknown_name("engine", engine, ENGINES))
+    files, plugins = ENGINES[engine], manager or Manager.loaded()
+    opened, target = _open(groom, plugins), Path(folder)
+    try:
+        target.mkdir(parents=True, exist_ok=True)
+    except (FileExistsError, NotADirectoryError) as error:
+        raise InputError(f"{folder}: not a folder; choose another for the files") from error
+    for file in files:
+        path = target / file.name
+        plugins.call("export_groom", file.plugin, file.options, groom=opened, path=path)
+    return tuple(target / file.name for file in files)
 
 
 def wrap(

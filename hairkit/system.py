@@ -70,7 +70,7 @@ def lock_file(handle: int, path: Path) -> bool:
 def own_group() -> dict[str, Any]:
     """Return settings of `Popen` for a process that Ctrl-C does not reach."""
     if SYSTEM == "win32":
-        return {"creationflags": getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0x200)}
+        return {"creationflags": getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)}
     return {"start_new_session": True}
 
 

@@ -28,7 +28,8 @@ from hairkit.cameras.similarity import Similarity, fit_similarity
 from hairkit.errors import FormatError, InputError
 from hairkit.head_model.thin_plate_spline import ThinPlateSpline
 from hairkit.io.glb_mesh import read_glb
-from hairkit.io.head_reader import UNITS, read_landmarks
+from hairkit.io.head_landmarks import read_landmarks
+from hairkit.io.head_reader import UNITS
 from hairkit.io.mesh_text import read_obj, read_ply
 from hairkit.io.ply_elements import read_elements
 from hairkit.options import option

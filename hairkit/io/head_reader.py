@@ -17,10 +17,11 @@ from hairkit.head_model.carry_scalp import transfer_scalp
 from hairkit.head_model.reach import Reach
 from hairkit.head_model.template import default_head
 from hairkit.io.glb_mesh import read_glb
+from hairkit.io.head_landmarks import read_landmarks
 from hairkit.io.mesh_text import FileMesh, obj_side_files, read_obj, read_ply
 from hairkit.io.photos import read_drawing
 from hairkit.io.textures import as_maps, write_mtl
-from hairkit.storage import read_text, write_text
+from hairkit.storage import write_text
 from hairkit.types.head import Capsules, Head
 from hairkit.types.skin import Blendshape, SkinMaps
 
@@ -39,7 +40,6 @@ _LEVEL_BREADTHS = 0.1
 """Half the height, in head breadths, of the slice that gives the cranium's depth."""
 _WHITE = 0.75
 """Brightness that painted scalp reaches and bare skin does not, of 1."""
-_MAX_LANDMARK_BYTES = 2**20
 _TOP_OVER_BREADTH = 0.452
 """Height of the crown over the head's centre, in head breadths."""
 _HOW_TO_MARK = (
@@ -359,28 +359,6 @@ def _landmarks(file: Path, vertices: Float64Array, units: str, up: str) -> Int32
             " head; same units and axes?"
         )
     return np.asarray(nearest, np.int32)
-
-
-def read_landmarks(file: Path, count: int) -> Float64Array | None:
-    """Return the landmarks beside a mesh of `count` vertices, in NAME.landmarks.json.
-
-    They are (68,) numbers of vertices, or (68, 3) points in the file's unit and axes; None where
-    there is no such file. Raises `FormatError`, which names it, where it holds anything else.
-    """
-    path = _beside(file, "landmarks.json")
-    if not os.path.lexists(path):
-        return None
-    text = read_text(path, _MAX_LANDMARK_BYTES)
-    try:
-        data = json.loads(text)
-        values = np.array(data["landmarks"] if isinstance(data, dict) else data, np.float64)
-    except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
-        raise FormatError(f"{path}: not a JSON list of 68 landmarks ({error})") from error
-    if values.shape not in ((68,), (68, 3)) or not np.isfinite(values).all():
-        raise FormatError(f"{path}: expected 68 vertex numbers or 68 points, all finite")
-    if values.ndim == 1 and ((values % 1 != 0).any() or values.min() < 0 or values.max() >= count):
-        raise FormatError(f"{path}: a landmark names a vertex the head does not have")
-    return values
 
 
 def _in_unit_square(uv: Float64Array) -> Float64Array:

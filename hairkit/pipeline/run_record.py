@@ -60,6 +60,8 @@ class PluginRecord:
     code: str
     """Digest of the plugin's source and of what it imports, see `module_digest`."""
     options: Mapping[str, Any]
+    file: str = ""
+    """Where it exports to, if not to its usual file."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +106,7 @@ class RunRecord:
         stages = []
         for table in OF_TABLE:
             own = [p for p in self.plugins if new_table(p.stage, RECORD) == table]
-            choices = tuple(Choice(p.plugin, MappingProxyType(dict(p.options))) for p in own)
+            choices = tuple(Choice(p.plugin, MappingProxyType({**p.options}), p.file) for p in own)
             if choices:
                 stages.append(Selection(table, choices))
         if not stages or stages[0].table != "capture":  # a record from before that stage
@@ -193,12 +195,17 @@ def finish_record(
     stages: Sequence[StageTime],
     health: Sequence[Figure],
 ) -> RunRecord:
-    """Return the record with what the run gave; outputs are named without their folder."""
+    """Return the record with what the run gave; outputs are named in the folder of the first."""
+    folder = outputs[0].parent
     return dataclasses.replace(
         record,
         stages=tuple(stages),
         health=tuple(health),
-        outputs=tuple(hash_file(path, path.name) for path in outputs if path.is_file()),
+        outputs=tuple(
+            hash_file(path, path.relative_to(folder).as_posix())
+            for path in outputs
+            if path.is_file()
+        ),
     )
 
 
@@ -268,7 +275,9 @@ def _plugins(recipe: Recipe, manager: Manager) -> tuple[PluginRecord, ...]:
             file = Path(info.distribution)
             origin = str(file.resolve()) if file.is_file() else info.distribution
             records.append(
-                PluginRecord(stage.table, choice.plugin, origin, info.version, code, values)
+                PluginRecord(
+                    stage.table, choice.plugin, origin, info.version, code, values, choice.file
+                )
             )
     return tuple(records)
 

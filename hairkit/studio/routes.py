@@ -93,7 +93,7 @@ class Routes:
             ("/api/result/draft", "GET", partial(self._made, name=self._studio.project.draft.name)),
             ("/api/result/sheet", "GET", partial(self._made, name="contact_sheet.png")),
             ("/api/result/page", "GET", self._page),
-            ("/api/result/{plugin:str}", "GET", self._file),
+            ("/api/result/{format:str}", "GET", self._file),
         ]
         return [Route(path, _clear(handler), methods=[method]) for path, method, handler in table]
 
@@ -318,8 +318,8 @@ class Routes:
 
     async def _file(self, request: Request) -> Response:
         """Write the groom in a format, unless the build has, and send it."""
-        studio, plugin = self._studio, request.path_params["plugin"]
-        suffix = dict(studio.formats).get(plugin)
+        studio, format_ = self._studio, request.path_params["format"]
+        suffix = dict(studio.formats).get(format_)
         if suffix is None or not studio.project.groom.is_file():
             raise HTTPException(HTTPStatus.NOT_FOUND, _UNKNOWN)
         path = studio.project.result / f"groom{suffix}"
@@ -330,7 +330,7 @@ class Routes:
                 await studio.builder.call(
                     "export",
                     EXPORT_S + BUILD_S,
-                    {"groom": str(groom), "plugin": plugin, "path": str(made)},
+                    {"groom": str(groom), "format": format_, "path": str(made)},
                 )
                 made.replace(path)
         return FileResponse(path, media_type="application/octet-stream", filename=path.name)

@@ -360,5 +360,6 @@ def test_an_exporter_without_suffix_gets_its_name() -> None:
     manager = Manager()
     manager.register(ball_plugin, "ball_plugin")
     recipe = parse_recipe(RECIPE.encode(), "ball", "test")
-    assert export_paths("out", recipe, manager) == (("ball_plugin", Path("out/groom.ball")),)
+    [(choice, path)] = export_paths("out", recipe, manager)
+    assert (choice.plugin, path) == ("ball_plugin", Path("out/groom.ball"))
     assert export_paths("out", recipe.with_set(["export=none"]), manager) == ()

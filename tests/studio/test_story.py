@@ -247,7 +247,7 @@ def test_every_format_is_downloaded(page: Any, story: Any, tmp_path: Path) -> No
     page.locator("a[download='groom.npz']").wait_for()
     offered = page.locator("a[download]").all()
     names = [link.get_attribute("download") for link in offered]
-    assert {"groom.apx", "groom.npz", "result.html"} < set(names)
+    assert {"groom.apx", "groom.npz", "groom-unreal.zip", "result.html"} < set(names)
     for link, name in zip(offered, names, strict=True):
         path = tmp_path / name
         download(page, link, path)
