@@ -56,6 +56,8 @@ class Routes:
         """`link` returns a new link for a further browser."""
         self._studio = studio
         self._sessions = sessions
+        self._writing = asyncio.Lock()
+        """Held while a file is written: who asks for it meanwhile gets the same one."""
         self._link = link
 
     def all(self) -> list[Route]:
@@ -102,7 +104,8 @@ class Routes:
         secret = self._sessions.open(token) if isinstance(token, str) else None
         if secret is None:
             raise HTTPException(
-                HTTPStatus.FORBIDDEN, "this link was used before; the terminal shows a new one"
+                HTTPStatus.FORBIDDEN,
+                "this link was used before, or is not whole; open the last one in the terminal",
             )
         response = JSONResponse({})
         secure = request.url.scheme == "https"
@@ -323,17 +326,19 @@ class Routes:
         if suffix is None or not studio.project.groom.is_file():
             raise HTTPException(HTTPStatus.NOT_FOUND, _UNKNOWN)
         path = studio.project.result / f"groom{suffix}"
-        groom = studio.project.groom
-        if not path.is_file() or path.stat().st_mtime_ns < groom.stat().st_mtime_ns:
-            with tempfile.TemporaryDirectory(dir=studio.project.incoming) as folder:
-                made = Path(folder) / path.name
-                await studio.builder.call(
-                    "export",
-                    EXPORT_S + BUILD_S,
-                    {"groom": str(groom), "format": format_, "path": str(made)},
-                )
-                made.replace(path)
+        async with self._writing:
+            await self._make_file(format_, path)
         return FileResponse(path, media_type="application/octet-stream", filename=path.name)
+
+    async def _make_file(self, format_: str, path: Path) -> None:
+        groom = self._studio.project.groom
+        if path.is_file() and path.stat().st_mtime_ns >= groom.stat().st_mtime_ns:
+            return
+        with tempfile.TemporaryDirectory(dir=self._studio.project.incoming) as folder:
+            made = Path(folder) / path.name
+            values = {"groom": str(groom), "format": format_, "path": str(made)}
+            await self._studio.builder.call("export", EXPORT_S + BUILD_S, values)
+            made.replace(path)
 
     async def _made(self, request: Request, name: str) -> Response:
         path = self._studio.project.result / name

@@ -20,7 +20,7 @@ export async function send(method, path, body) {
   }));
 }
 
-// Let the server make a file, which a link then loads; the error says why there is none.
+// Ask for a file that a link loads at the same time; the error says why there is none.
 export async function prepare(path) {
   const response = await fetch(path);
   if (!response.ok) await answer(response);

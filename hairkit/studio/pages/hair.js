@@ -114,15 +114,7 @@ function download([format, suffix]) {
   const link = make("a",
     { href: `/api/result/${format}`, download: `groom${suffix}`, class: "button file" },
     make("strong", {}, suffix.replace("-", "")), make("small", {}, USES[format] ?? format));
-  link.addEventListener("click", async (event) => {
-    if (!event.isTrusted) return; // the click below, which downloads
-    event.preventDefault();
-    try {
-      await prepare(link.href);
-      link.click();
-    } catch (error) {
-      say(error.message);
-    }
-  });
+  // A browser does not say why a download failed.
+  link.addEventListener("click", () => prepare(link.href).catch((error) => say(error.message)));
   return link;
 }
