@@ -35,6 +35,8 @@ MAX_UNPACKED_RATIO, FREE_UNPACKED_BYTES = 32, 64 * 2**20
 Deflate reaches 1030 : 1 on zeros. Grooms are packed 1.5 : 1 and volumes 8 : 1; masks, 65 : 1, are
 below 64 MiB.
 """
+_POINTER = b"version https://git-lfs.github.com/spec/"
+"""Begin of a text that stands for a large file in a clone without Git LFS."""
 _CHUNK_BYTES = 2**20
 """Arrays are unpacked in pieces of this size, straight into their memory."""
 _KINDS = {
@@ -140,8 +142,8 @@ def open_file(path: str | os.PathLike[str]) -> BinaryIO:
     Raises
     ------
     InputError
-        It is missing, cannot be read, or is a folder, pipe, socket or device: reading one of those
-        may wait forever or never end.
+        It is missing, cannot be read, a pointer of Git LFS, or a folder, pipe, socket or device:
+        reading one of these may wait forever or never end.
     """
     try:
         _check_kind(path, os.stat(path).st_mode)
@@ -151,10 +153,14 @@ def open_file(path: str | os.PathLike[str]) -> BinaryIO:
         )
         try:
             _check_kind(path, os.fstat(handle).st_mode)
-            return os.fdopen(handle, "rb")
+            file = os.fdopen(handle, "rb")
         except BaseException:
             os.close(handle)
             raise
+        if file.peek(len(_POINTER)).startswith(_POINTER):
+            file.close()
+            raise InputError(f"{path}: a pointer of Git LFS, not the file itself; git lfs pull")
+        return file
     except FileNotFoundError as error:
         raise InputError(f"{path}: no such file") from error
     except (OSError, ValueError) as error:  # ValueError: a NUL within the name

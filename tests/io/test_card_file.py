@@ -86,8 +86,11 @@ def test_nodes_and_meshes_have_names_of_their_own(name: str, tmp_path: Path) -> 
 def test_an_avatar_of_others_is_told_as_a_head(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """A .vrm without our cards has no strands, but a body that can be measured."""
+    """A .vrm without our cards has no strands, but a body that can be measured, scalp or not."""
     hairkit.export(bristle_groom(), tmp_path / "a.glb", lines="none")
     (tmp_path / "a.glb").rename(tmp_path / "a.vrm")
     assert main(["info", str(tmp_path / "a.vrm")]) == 0
     assert "kind: head" in capsys.readouterr().out
+    (tmp_path / "b.obj").write_text("v 0 0 0\nv 0.1 0 0\nv 0 0.1 0.1\nf 1 2 3\n")
+    assert main(["info", str(tmp_path / "b.obj"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["scalp_vertices"] == 0
