@@ -96,24 +96,11 @@ def export(
 def export_for(
     groom: Groom | StrPath, engine: str, folder: StrPath, *, manager: Manager | None = None
 ) -> tuple[Path, ...]:
-    """Write what an engine takes into a folder and return the files, the hair first.
+    """Write what an engine takes into a folder, and return the files, the hair first.
 
-    Format, axes, unit, guides or full hair, and names are those of the engine's page in the
-    documentation: `export_for(groom, "unreal", "unreal/")`.
-
-    Parameters
-    ----------
-    groom
-        A groom, or what `read_groom` reads.
-    engine
-        `unreal`, `unity`, `blender`, `maya`, `houdini`, `hairworks` or `web`.
-    folder
-        Made where there is none; files of the same names in it are replaced.
-
-    Raises
-    ------
-    InputError
-        There is no such engine, or a file is in the folder's place.
+    `export_for(groom, "unreal", "unreal/")`: format, axes, unit, guides or full hair, and names are
+    those of the engine's page in the documentation (`hairkit.grooming.engine_files.ENGINES`). The
+    folder is made where there is none. `InputError` for another engine, or a file in its place.
     """
     if engine not in ENGINES:
         raise InputError(unknown_name("engine", engine, ENGINES))

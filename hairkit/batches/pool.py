@@ -53,7 +53,7 @@ class LocalPool:
         A job may take the whole budget unless `limits` says less.
         """
         self._workers = workers
-        self._budget = budget_bytes or int(BUDGET_SHARE * free_bytes())
+        self._budget = budget_bytes or int(BUDGET_SHARE * max(available_bytes(), FIRST_GUESS))
         self._limits = replace(limits, memory_bytes=limits.memory_bytes or self._budget)
         self._threads = threads
         self._command = command
@@ -140,8 +140,3 @@ class LocalPool:
                 return False
             self._running += 1
             return True
-
-
-def free_bytes() -> int:
-    """Return the memory that is free on this machine, within the limits of its container."""
-    return max(available_bytes(), FIRST_GUESS)

@@ -89,7 +89,7 @@ def _facts(path: Path, args: argparse.Namespace) -> dict[str, Any]:
     bare = read_bare_head(path, args.head_units, args.head_scalp)
     if bare.scalp is None:
         facts = {"vertices": len(bare.vertices), "faces": len(bare.faces), "scalp_vertices": 0}
-        return {"kind": "head", **facts, "bounds_m": _bounds(bare.vertices)}
+        return {"kind": "head", **facts, "bounds_m": _bounds(bare.vertices.astype(np.float32))}
     return {"kind": "head", **_head(read_head(path, args.head_units, args.head_scalp))}
 
 

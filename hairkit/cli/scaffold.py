@@ -59,8 +59,9 @@ def new_plugin(stage: str, name: str, folder: str | os.PathLike[str] | None = No
 def _files(hook: str, name: str) -> dict[str, str]:
     distribution, module = f"hairkit-{name.replace('_', '-')}", f"hairkit_{name}"
     words = {"NAME": name, "DISTRIBUTION": distribution, "MODULE": module, "HOOK": hook}
-    use = _COMMANDS.get(hook, "hairkit reconstruct photos/ -o out/ --set TABLE=NAME")
-    use = use.replace("TABLE", OF_HOOK[hook].name if hook in OF_HOOK else "")
+    run = "hairkit reconstruct photos/ -o out/"
+    chosen = f"{run} --set {OF_HOOK[hook].name}=NAME" if hook in OF_HOOK else run
+    use = _COMMANDS.get(hook, chosen)
     texts = {
         "pyproject.toml": _PYPROJECT,
         f"{module}.py": _module(hook),
@@ -132,8 +133,6 @@ _COMMANDS = {
     "export_groom": "hairkit export out/groom.npz -o hair.NAME",
     "import_groom": "hairkit convert hair.NAME hair.abc",
     "validate_groom": "hairkit validate hair.abc --for unreal",
-    "stage_finished": "hairkit reconstruct photos/ -o out/",
-    "groom_ready": "hairkit reconstruct photos/ -o out/",
 }
 """Commands that use plugins of hooks which a recipe alone does not choose."""
 

@@ -269,9 +269,6 @@ def _loses_data(data: bytes, pixels: npt.NDArray[Any]) -> bool:
 
 def _has_grey_block(pixels: npt.NDArray[Any]) -> bool:
     """Return whether a block of a picture, which may be decoded at half its size, is mid-grey."""
-    corners = (pixels[::_BLOCK, ::_BLOCK] == _MID_GREY).all(axis=-1)
-    if not corners.any():
-        return False
     rows, columns = (edge // _BLOCK for edge in pixels.shape[:2])
     grey = (pixels[: rows * _BLOCK, : columns * _BLOCK] == _MID_GREY).all(axis=-1)
     return bool(grey.reshape(rows, _BLOCK, columns, _BLOCK).all(axis=(1, 3)).any())
