@@ -106,10 +106,9 @@ def export_for(
         raise InputError(unknown_name("engine", engine, ENGINES))
     files, plugins = ENGINES[engine], manager or Manager.loaded()
     opened, target = _open(groom, plugins), Path(folder)
-    try:
-        target.mkdir(parents=True, exist_ok=True)
-    except (FileExistsError, NotADirectoryError) as error:
-        raise InputError(f"{folder}: not a folder; choose another for the files") from error
+    if target.exists() and not target.is_dir():
+        raise InputError(f"{folder}: not a folder; choose another for the files")
+    target.mkdir(parents=True, exist_ok=True)
     for file in files:
         path = target / file.name
         plugins.call("export_groom", file.plugin, file.options, groom=opened, path=path)

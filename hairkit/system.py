@@ -12,6 +12,7 @@ import errno
 import logging
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -81,8 +82,6 @@ def kill_group(process: subprocess.Popen[Any]) -> None:
             words = ["taskkill", "/F", "/T", "/PID", str(process.pid)]
             subprocess.run(words, capture_output=True, check=False)
         else:
-            import signal
-
             os.killpg(process.pid, signal.SIGKILL)
     process.kill()
 
@@ -159,10 +158,7 @@ def core_count() -> int:
 
 
 def user_id() -> int:
-    """Return the number of the user; 0 on Windows, where each has a temporary folder of their own.
-
-    It is that of `os.stat`, which is 0 there, too.
-    """
+    """Return the number of the user as `os.stat` has it, which is 0 on Windows."""
     return os.getuid() if SYSTEM != "win32" else 0
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from hairkit.arrays import Int64Array
 from hairkit.errors import InputError
@@ -54,13 +54,11 @@ class Prediction:
         if not known:
             return self
         order = [self.names.index(name) for name in truth.names]
-        return Prediction(
-            self.groom,
-            truth.names,
-            tuple(self.cameras[i] for i in order),
-            None if self.orientations is None else tuple(self.orientations[i] for i in order),
-            None if self.masks is None else tuple(self.masks[i] for i in order),
-        )
+        changes: dict[str, Any] = {"names": truth.names}
+        for name in ("cameras", "orientations", "masks"):
+            if getattr(self, name) is not None:
+                changes[name] = tuple(getattr(self, name)[i] for i in order)
+        return replace(self, **changes)
 
 
 def read_prediction(

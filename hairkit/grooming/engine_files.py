@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 
 @dataclass(frozen=True)
@@ -19,21 +20,18 @@ class EngineFile:
     options: Mapping[str, object] = field(default_factory=dict)
 
 
-def _hair(**options: object) -> EngineFile:
-    return EngineFile("hair.abc", "alembic", options)
-
-
+_hair = partial(EngineFile, "hair.abc", "alembic")
 _HEAD = EngineFile("head.fbx", "fbx")
 ENGINES = {
-    "unreal": (_hair(axis="unreal", hairs=50_000), _HEAD),
-    "unity": (_hair(hairs=20_000), _HEAD),
-    "blender": (_hair(hairs=20_000), _HEAD),
+    "unreal": (_hair({"axis": "unreal", "hairs": 50_000}), _HEAD),
+    "unity": (_hair({"hairs": 20_000}), _HEAD),
+    "blender": (_hair({"hairs": 20_000}), _HEAD),
     "maya": (
-        _hair(axis="y_up_centimetres", hairs=20_000),
+        _hair({"axis": "y_up_centimetres", "hairs": 20_000}),
         EngineFile("guides.ma", "maya", {"strands": "guides"}),
         _HEAD,
     ),
-    "houdini": (_hair(hairs=20_000), _HEAD),
+    "houdini": (_hair({"hairs": 20_000}), _HEAD),
     "hairworks": (EngineFile("hair.apx", "hairworks"),),
     "web": (EngineFile("hair.glb", "gltf"),),
 }

@@ -375,15 +375,14 @@ def _stage(table: str, content: object, source: str) -> Selection:
 
 
 def _engine_choices(engines: Any, source: str) -> tuple[Choice, ...]:
-    """Return the exports of engines, each engine's into a folder of its name."""
-    if not isinstance(engines, list) or not all(isinstance(name, str) for name in engines):
-        raise InputError(f"{source}: export.{_ENGINES} is {engines!r}, expected a list of engines")
-    wrong = next((name for name in engines if name not in ENGINES), None)
+    """Return the exports of one or several engines, each engine's into a folder of its name."""
+    names = [str(name) for name in (engines if isinstance(engines, list) else [engines])]
+    wrong = next((name for name in names if name not in ENGINES), None)
     if wrong is not None:
         raise InputError(f"{source}: export.{_ENGINES}: {unknown_name('engine', wrong, ENGINES)}")
     return tuple(
         Choice(file.plugin, MappingProxyType(dict(file.options)), f"{engine}/{file.name}")
-        for engine in dict.fromkeys(engines)
+        for engine in dict.fromkeys(names)
         for file in ENGINES[engine]
     )
 

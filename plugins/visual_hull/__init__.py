@@ -260,10 +260,8 @@ def _grid_around_hair(
     share = len(cells) * coarse.spacing**3 / MOST_HAIR
     spacing = options.voxel_size * max(1.0, share) ** (1 / 3)
     if share > 1:
-        _log.warning(
-            "the masks hold %.0f litres of hair, so cells are %.1f mm wide, not %.1f; look at them",
-            1000 * share * MOST_HAIR, 1000 * spacing, 1000 * options.voxel_size,
-        )  # fmt: skip
+        said = "masks hold %.0f litres of hair, so cells are %.1f mm wide, not %.1f; look at them"
+        _log.warning(said, *(1000 * v for v in (share * MOST_HAIR, spacing, options.voxel_size)))
     if not len(cells):
         raise InputError(
             "the hull is empty: the masks of the views do not overlap in space; "
