@@ -14,7 +14,7 @@ LIBRARIES := libegl1 libgl1 libgl1-mesa-dri libosmesa6
 DISPLAYS := xvfb chromium
 ENGINES := xvfb xauth godot3
 
-.PHONY: test test-clients test-slow demo lint docs matrix wheel bench clean
+.PHONY: test test-clients test-slow demo lint docs matrix resolve wheel sbom bench clean
 
 # A worker has one core: threads of matrix products would wait for each other.
 test test-clients: export OPENBLAS_NUM_THREADS := 1
@@ -54,9 +54,23 @@ docs: $(VENV)/.docs
 matrix: $(VENV)/.hairkit
 	$(BIN)/python .ci/matrix.py $(MATRIX)
 
+# Whether Windows and macOS have wheels of all dependencies.
+resolve: $(VENV)/.python
+	$(BIN)/python .ci/resolve.py
+
 # A wheel for this Python on x86-64 Linux, with compiled kernels: its first run compiles nothing.
 wheel: $(VENV)/.tests $(VENV)/.models $(VENV)/.lint
 	$(BIN)/python .ci/wheel.py dist
+
+# What an installation with all extras for users consists of, with the licences (CycloneDX).
+sbom: $(VENV)/.python
+	$(PYTHON) -m venv --clear build/sbom && $(PYTHON) -m venv --clear build/cyclonedx
+	build/sbom/bin/python -m pip install --quiet --disable-pip-version-check '.[all]'
+	build/cyclonedx/bin/python -m pip install --quiet --disable-pip-version-check 'cyclonedx-bom>=7,<8'
+	@mkdir -p dist
+	build/cyclonedx/bin/cyclonedx-py environment --pyproject pyproject.toml --output-reproducible \
+	  -o dist/hairkit.cdx.json build/sbom
+	@echo "dist/hairkit.cdx.json names every package with its version and licence"
 
 bench: $(VENV)/.tests
 	$(BIN)/python benchmarks/bench.py -o bench.json

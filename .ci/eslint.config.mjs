@@ -5,7 +5,7 @@ const browser = [
   "devicePixelRatio", "document", "DOMParser", "EventSource", "fetch", "history",
   "HTMLButtonElement", "HTMLInputElement", "HTMLSelectElement", "Image", "location", "navigator",
   "Path2D", "performance", "removeEventListener", "requestAnimationFrame", "ResizeObserver",
-  "setInterval", "setTimeout", "speechSynthesis", "SpeechSynthesisUtterance", "TextDecoder", "URL",
+  "setInterval", "setTimeout", "sessionStorage", "speechSynthesis", "SpeechSynthesisUtterance", "TextDecoder", "URL",
   "URLSearchParams", "window",
 ];
 

@@ -4,6 +4,7 @@ Nothing is loaded before Ctrl-C is answered in one line. The first Ctrl-C lets t
 running end, the second ends the process, whatever its threads do.
 """
 
+import io
 import os
 import sys
 
@@ -15,6 +16,7 @@ SOON_S = 0.5
 
 def main() -> int:
     """Run the command line and return its exit code."""
+    _open_standard_streams()
     try:
         _end_at_second_interrupt()
         from hairkit.cli import main as run
@@ -27,8 +29,26 @@ def main() -> int:
         return 2
 
 
+def _open_standard_streams() -> None:
+    """Let nothing that is opened later take the place of a standard stream that is closed.
+
+    What a stream cannot write, such as a name in other letters than a Windows console has, is
+    written as an escape.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDWR)  # takes the lowest number that is free
+            setattr(sys, name, os.fdopen(number, "w" if number else "r"))
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
 def _end_at_second_interrupt() -> None:
     """Start a thread that counts Ctrl-C: the main thread may wait for a plugin that hangs."""
+    import atexit
     import signal
     import socket
     import threading
@@ -65,6 +85,8 @@ def _end_at_second_interrupt() -> None:
     pressed.setblocking(False)
     signal.set_wakeup_fd(pressed.detach(), warn_on_full_buffer=False)
     signal.signal(signal.SIGINT, interrupt)
+    # when all threads have ended, nothing but the exit code is left to be lost
+    atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=listen, name="ctrl-c", daemon=True).start()
 
 

@@ -17,8 +17,10 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.errors import InputError
+from hairkit.grooming.engine_files import ENGINES
 from hairkit.io.capture_reader import TURN, WORKING_EDGE, read_capture, sample_folder
 from hairkit.manager import Manager
+from hairkit.options import unknown_name
 from hairkit.pipeline.open_groom import load_groom, plugin_for
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture
@@ -89,6 +91,28 @@ def export(
         checked = plugins.options(name, values)
         opened = _open(groom, plugins)
         plugins.call("export_groom", name, checked, groom=opened, path=Path(path))
+
+
+def export_for(
+    groom: Groom | StrPath, engine: str, folder: StrPath, *, manager: Manager | None = None
+) -> tuple[Path, ...]:
+    """Write what an engine takes into a folder, and return the files, the hair first.
+
+    `export_for(groom, "unreal", "unreal/")`: format, axes, unit, guides or full hair, and names are
+    those of the engine's page in the documentation (`hairkit.grooming.engine_files.ENGINES`). The
+    folder is made where there is none. `InputError` for another engine, or a file in its place.
+    """
+    if engine not in ENGINES:
+        raise InputError(unknown_name("engine", engine, ENGINES))
+    files, plugins = ENGINES[engine], manager or Manager.loaded()
+    opened, target = _open(groom, plugins), Path(folder)
+    if target.exists() and not target.is_dir():
+        raise InputError(f"{folder}: not a folder; choose another for the files")
+    target.mkdir(parents=True, exist_ok=True)
+    for file in files:
+        path = target / file.name
+        plugins.call("export_groom", file.plugin, file.options, groom=opened, path=path)
+    return tuple(target / file.name for file in files)
 
 
 def wrap(

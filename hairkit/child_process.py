@@ -13,7 +13,6 @@ import itertools
 import json
 import os
 import queue
-import shutil
 import signal
 import subprocess
 import sys
@@ -26,7 +25,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hairkit.errors import HairkitError
+from hairkit.errors import HairkitError, one_line
+from hairkit.system import (
+    kill_group,
+    limit_process,
+    memory_folder,
+    own_group,
+    resident_bytes,
+)
 
 POLL_S = 0.05
 """Seconds between two looks at memory and output of a process that is at work."""
@@ -42,9 +48,8 @@ ENDING_S = 2.0
 """Seconds that a process which closed its output is given to end by itself."""
 LARGEST_FILE = 2**32
 """Bytes of a file that a process may write."""
-IN_MEMORY, LEAST_FREE = "/dev/shm", 2**30
-"""Where a call's files lie on Linux, and bytes that must be free there; else with other temporary
-files."""
+KILLED = -9
+"""Exit code of a process that somebody killed; on Windows there is none of its own."""
 _NOISE = -1
 """Stands on the queue for output without end."""
 
@@ -151,7 +156,7 @@ class ChildProcess:
         if self._running is None or not self._running.alive:
             self._end()
             self._running = _Running(self._command, self._environment, self._folder)
-            _limit(self._running.process.pid, self._address_bytes)
+            limit_process(self._running.process.pid, LARGEST_FILE, self._address_bytes)
             weakref.finalize(self, _Running.end, self._running)
         return self._running
 
@@ -175,7 +180,7 @@ class _Running:
                 stderr=subprocess.PIPE,
                 env=environment,
                 cwd=folder,
-                start_new_session=True,  # Ctrl-C is for hairkit, which ends it
+                **own_group(),  # Ctrl-C is for hairkit, which ends it
             )
         except (OSError, ValueError) as error:
             reason = getattr(error, "strerror", None) or str(error)
@@ -235,9 +240,7 @@ class _Running:
         """End the process and those that it started, unless it belongs to another process."""
         if os.getpid() != self._owner:
             return
-        with contextlib.suppress(OSError):
-            os.killpg(self.process.pid, signal.SIGKILL)
-        self.process.kill()
+        kill_group(self.process)
 
     def end(self) -> None:
         """Kill it and wait for its end."""
@@ -277,7 +280,7 @@ class _Running:
             return ChildError("closed its output without an answer")
         if code < 0:
             name = signal.Signals(-code).name if -code in {*signal.Signals} else f"signal {-code}"
-            return ChildError(f"crashed ({name})", killed=-code == signal.SIGKILL)
+            return ChildError(f"crashed ({name})", killed=code == KILLED)
         self._readers[1].join(POLL_S)
         said = self._tail.decode(errors="replace").strip().splitlines()[-1:]
         reason = f": {shortened(said[0])}" if said else ""
@@ -330,36 +333,9 @@ def call_folder() -> tempfile.TemporaryDirectory[str]:
     )
 
 
-def memory_folder() -> str | None:
-    """Return the system's folder in memory, None where it has none or little is left there.
-
-    `TMPDIR`, where it is set, is used instead.
-    """
-    if os.environ.get("TMPDIR"):
-        return None
-    try:
-        free = shutil.disk_usage(IN_MEMORY).free
-    except OSError:
-        return None
-    return IN_MEMORY if free > LEAST_FREE and os.access(IN_MEMORY, os.W_OK) else None
-
-
-def resident_bytes(pid: int) -> int:
-    """Return the resident memory of a process and its descendants; 0 where Linux does not say."""
-    try:
-        with open(f"/proc/{pid}/statm", "rb") as file:
-            total = int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
-    except (OSError, IndexError):
-        return 0
-    with contextlib.suppress(OSError):  # it may end meanwhile
-        for children in Path(f"/proc/{pid}/task").glob("*/children"):  # each thread has its own
-            total += sum(resident_bytes(int(child)) for child in children.read_bytes().split())
-    return total
-
-
 def shortened(text: str) -> str:
     """Return a text in one line of at most `LONGEST_REASON` characters that can be printed."""
-    line = " ".join("".join(c if c.isprintable() else " " for c in text).split())
+    line = one_line(text)
     return line if len(line) <= LONGEST_REASON else f"{line[:LONGEST_REASON]}..."
 
 
@@ -371,21 +347,3 @@ def _parsed(line: bytes) -> dict[str, Any]:
     if not isinstance(message, dict) or type(message.get("id")) is not int:
         raise ChildError(f"said what is no answer: {shortened(line.decode(errors='replace'))}")
     return message
-
-
-def _limit(pid: int, address_bytes: int | None) -> None:
-    """Keep a process from filling the disk by one file or its core, and from more addresses.
-
-    A limit that is lower already stays.
-    """
-    if sys.platform == "linux":
-        import resource
-
-        limits = {resource.RLIMIT_CORE: 0, resource.RLIMIT_FSIZE: LARGEST_FILE}
-        if address_bytes is not None:
-            limits[resource.RLIMIT_AS] = address_bytes
-        for kind, wanted in limits.items():
-            with contextlib.suppress(OSError):
-                _, most = resource.prlimit(pid, kind)
-                if most == resource.RLIM_INFINITY or most > wanted:
-                    resource.prlimit(pid, kind, (wanted, wanted))

@@ -3,6 +3,16 @@
 from __future__ import annotations
 
 
+def one_line(text: object) -> str:
+    r"""Return a text in one line that a terminal shows as it is, whatever file it quotes.
+
+    >>> one_line("no node \x1b[2J\n named 'a'")
+    "no node \\x1b[2J named 'a'"
+    """
+    line = " ".join(str(text).split())
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)
+
+
 class HairkitError(Exception):
     """Base of every error hairkit raises on purpose; its text is one line for the user."""
 

@@ -8,8 +8,7 @@ most it is given back, so that what one stage leaves does not add to the peak of
 
 from __future__ import annotations
 
-import sys
-from typing import Any
+from hairkit.system import of_glibc
 
 TRIM_THRESHOLD, TOP_PAD, MMAP_THRESHOLD, ARENA_MAX = -1, -2, -3, -8
 """Numbers of the settings, from glibc's `malloc.h`."""
@@ -22,7 +21,7 @@ more for the sample, at the same processor time."""
 
 def keep_freed_memory() -> None:
     """Keep freed memory in this process; nothing happens where the C library is not glibc."""
-    mallopt = _of_glibc("mallopt")
+    mallopt = of_glibc("mallopt")
     if mallopt is not None:
         for setting, value in SETTINGS.items():
             mallopt(setting, value)
@@ -30,15 +29,6 @@ def keep_freed_memory() -> None:
 
 def give_back_memory() -> None:
     """Give back what is kept; nothing happens where the C library is not glibc."""
-    trim = _of_glibc("malloc_trim")
+    trim = of_glibc("malloc_trim")
     if trim is not None:
         trim(0)
-
-
-def _of_glibc(name: str) -> Any:
-    """Return a function of the C library, None where there is none of the name."""
-    if sys.platform != "linux":
-        return None
-    import ctypes
-
-    return getattr(ctypes.CDLL(None), name, None)

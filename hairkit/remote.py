@@ -17,10 +17,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from hairkit.errors import HairkitError, InputError, MissingExtraError
+from hairkit.errors import HairkitError, InputError, MissingExtraError, one_line
 from hairkit.storage import MAX_FILE_BYTES
 from hairkit.storage import read_bytes as read_local
 from hairkit.storage import write_text as write_local
+from hairkit.system import user_id
 
 STAMPS = ("ETag", "etag", "mtime", "LastModified", "last_modified", "updated", "created")
 """What services call that which changes with a file's content."""
@@ -132,9 +133,9 @@ def send(folder: Path, url: str, *, without: str) -> None:
 
 def copies() -> Path:
     """Return this user's folder for copies of what lies at URLs."""
-    folder = Path(tempfile.gettempdir()) / f"hairkit-copies-{os.getuid()}"
+    folder = Path(tempfile.gettempdir()) / f"hairkit-copies-{user_id()}"
     folder.mkdir(mode=stat.S_IRWXU, exist_ok=True)
-    if folder.stat().st_uid != os.getuid():
+    if folder.stat().st_uid != user_id():
         raise InputError(f"{folder}: belongs to somebody else; set TMPDIR to a folder of yours")
     return folder
 
@@ -167,4 +168,4 @@ def _files(url: str | os.PathLike[str]) -> Iterator[tuple[Any, str]]:
 
 
 def _line(error: Exception) -> str:
-    return " ".join(str(error).split()) or type(error).__name__
+    return one_line(error) or type(error).__name__

@@ -9,8 +9,8 @@ import contextlib
 import dataclasses
 import math
 import os
+import secrets
 import stat
-import tempfile
 import threading
 import tokenize
 import types
@@ -25,6 +25,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.errors import FormatError, InputError
+from hairkit.system import utf8_name
 
 MAX_FILE_BYTES = 4 * 2**30
 """Files larger than this are refused."""
@@ -34,6 +35,8 @@ MAX_UNPACKED_RATIO, FREE_UNPACKED_BYTES = 32, 64 * 2**20
 Deflate reaches 1030 : 1 on zeros. Grooms are packed 1.5 : 1 and volumes 8 : 1; masks, 65 : 1, are
 below 64 MiB.
 """
+_POINTER = b"version https://git-lfs.github.com/spec/"
+"""Begin of a text that stands for a large file in a clone without Git LFS."""
 _CHUNK_BYTES = 2**20
 """Arrays are unpacked in pieces of this size, straight into their memory."""
 _KINDS = {
@@ -139,8 +142,8 @@ def open_file(path: str | os.PathLike[str]) -> BinaryIO:
     Raises
     ------
     InputError
-        It is missing, cannot be read, or is a folder, pipe, socket or device: reading one of those
-        may wait forever or never end.
+        It is missing, cannot be read, a pointer of Git LFS, or a folder, pipe, socket or device:
+        reading one of these may wait forever or never end.
     """
     try:
         _check_kind(path, os.stat(path).st_mode)
@@ -150,10 +153,14 @@ def open_file(path: str | os.PathLike[str]) -> BinaryIO:
         )
         try:
             _check_kind(path, os.fstat(handle).st_mode)
-            return os.fdopen(handle, "rb")
+            file = os.fdopen(handle, "rb")
         except BaseException:
             os.close(handle)
             raise
+        if file.peek(len(_POINTER)).startswith(_POINTER):
+            file.close()
+            raise InputError(f"{path}: a pointer of Git LFS, not the file itself; git lfs pull")
+        return file
     except FileNotFoundError as error:
         raise InputError(f"{path}: no such file") from error
     except (OSError, ValueError) as error:  # ValueError: a NUL within the name
@@ -270,42 +277,29 @@ def replace_file(
     Raises
     ------
     InputError
-        There is something other than a file in the place, such as a device.
+        There is something other than a file in the place, such as a device, or its name is not
+        UTF-8.
     OSError
         The folder cannot be written to, or there is no room. It names `path`.
     """
+    utf8_name(path)
     target, temporary = Path(path), None
     try:
         with contextlib.suppress(FileNotFoundError):
             _check_kind(target, os.stat(target).st_mode)
-        handle, temporary = tempfile.mkstemp(
-            prefix=f".{target.name[:_NAME_KEPT]}.", suffix=suffix, dir=target.parent
-        )
-        os.close(handle)
-        yield Path(temporary)
+        temporary = target.with_name(f".{target.name[:_NAME_KEPT]}.{secrets.token_hex(4)}{suffix}")
+        temporary.touch(exist_ok=False)
+        yield temporary
         if durable:
             with open(temporary, "rb+") as file:
                 os.fsync(file.fileno())
-        os.umask(mask := os.umask(0))  # can only be read by setting it
-        os.chmod(temporary, 0o666 & ~mask)
         os.replace(temporary, target)
     except BaseException as error:
         if temporary is not None:
-            Path(temporary).unlink(missing_ok=True)
+            temporary.unlink(missing_ok=True)
         if isinstance(error, OSError):
             error.filename, error.filename2 = str(target), None  # not the temporary file
         raise
-
-
-def utf8_name(path: str | os.PathLike[str]) -> str:
-    """Return a path as C++ libraries take it: its bytes are UTF-8, whatever the locale says.
-
-    Raises `InputError` where the file system's name is not UTF-8.
-    """
-    try:
-        return os.fsencode(path).decode()
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path}: its name is not UTF-8; rename the file or its folder") from error
 
 
 def _check_kind(path: str | os.PathLike[str], mode: int) -> None:

@@ -14,7 +14,6 @@ a scan the points that the plugin `sfm` found on the person's skin take its plac
 
 from __future__ import annotations
 
-import json
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -29,12 +28,13 @@ from hairkit.cameras.similarity import Similarity, fit_similarity
 from hairkit.errors import FormatError, InputError
 from hairkit.head_model.thin_plate_spline import ThinPlateSpline
 from hairkit.io.glb_mesh import read_glb
+from hairkit.io.head_landmarks import read_landmarks
 from hairkit.io.head_reader import UNITS
 from hairkit.io.mesh_text import read_obj, read_ply
 from hairkit.io.ply_elements import read_elements
 from hairkit.options import option
-from hairkit.storage import read_bytes, read_text
-from hairkit.types.head import JAW_LANDMARKS, LANDMARKS
+from hairkit.storage import read_bytes
+from hairkit.types.head import JAW_LANDMARKS
 
 STIFFNESS = (0.2, 0.05, 0.02, 0.01)
 """Falling weights of the difference between neighbouring maps (Amberg's alpha). The head is scaled
@@ -119,7 +119,7 @@ def _sparse(scene: Scene) -> Scan:
 
 
 def read_scan(path: Path, units: str = "m") -> Scan:
-    """Return the scan in a file, with the landmarks of NAME.landmarks.json beside it, as points.
+    """Return the scan in a file, with the landmarks of NAME.landmarks.json beside it.
 
     Raises
     ------
@@ -139,6 +139,9 @@ def read_scan(path: Path, units: str = "m") -> Scan:
         raise FormatError(f"{path}: a scan must be a .ply, .obj or .glb file")
     if len(points) < FEWEST_POINTS:
         raise InputError(f"{path}: {len(points)} points, expected {FEWEST_POINTS} or more")
+    marks = read_landmarks(path, len(points))
+    if marks is not None:
+        marks = UNITS[units] * (points[marks.astype(np.int64)] if marks.ndim == 1 else marks)
     points = UNITS[units] * points
     across = float(np.linalg.norm(np.ptp(points, axis=0)))
     if not SMALLEST <= across <= LARGEST:
@@ -146,7 +149,7 @@ def read_scan(path: Path, units: str = "m") -> Scan:
             f"{path}: the scan is {across:.3g} m across in the unit {units!r}, expected"
             f" {SMALLEST:g} to {LARGEST:g}; set nonrigid_icp.units to one of {', '.join(UNITS)}"
         )
-    return Scan(points, faces, _landmarks(path, UNITS[units]))
+    return Scan(points, faces, marks)
 
 
 def place(scan: Scan, head: Head, source: object = "scan") -> Scan:
@@ -290,17 +293,3 @@ def _point_cloud(path: Path) -> Float64Array | None:
     if not np.isfinite(points).all():
         raise FormatError(f"{path}: holds coordinates that are not finite numbers")
     return points
-
-
-def _landmarks(path: Path, metres: float) -> Float64Array | None:
-    """Return the landmarks (68, 3) beside a scan, None without them."""
-    beside = path.with_name(f"{path.stem}.landmarks.json")
-    if not beside.is_file():
-        return None
-    try:
-        points = np.array(json.loads(read_text(beside)), np.float64)
-    except (ValueError, TypeError) as error:
-        raise FormatError(f"{beside}: not a list of points ({error})") from error
-    if points.shape != (LANDMARKS, 3) or not np.isfinite(points).all():
-        raise FormatError(f"{beside}: shape {points.shape}, expected {LANDMARKS} points x, y, z")
-    return metres * points

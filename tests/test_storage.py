@@ -85,6 +85,14 @@ def test_a_missing_file_is_named(tmp_path: Path) -> None:
         Strands.load(tmp_path / "none.npz")
 
 
+def test_a_pointer_of_git_lfs_is_told(tmp_path: Path) -> None:
+    """Asset repositories cloned without Git LFS hold pointers; the line says what to do."""
+    path = tmp_path / "ponytail.hair"
+    path.write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 9\n")
+    with pytest.raises(InputError, match=r"ponytail\.hair: a pointer of Git LFS.*git lfs pull"):
+        storage.open_file(path)
+
+
 def test_pickles_are_never_opened(tmp_path: Path) -> None:
     """An object array would run code when it is read: it is refused."""
     fired = tmp_path / "fired"

@@ -14,6 +14,7 @@ from hairkit.batches.run_job import JobLimits
 from hairkit.errors import InputError
 from hairkit.manager import Manager
 from hairkit.remote import is_url
+from hairkit.system import core_count
 
 GIB = 2**30
 """Bytes of a GiB."""
@@ -118,12 +119,6 @@ def _results(
             missing.append((job, own))
     if missing:
         yield from pool.run(missing, settings, watcher)
-
-
-def core_count() -> int:
-    """Return the number of cores that this process may use."""
-    affinity = getattr(os, "sched_getaffinity", None)
-    return len(affinity(0)) if affinity is not None else os.cpu_count() or 1
 
 
 def _bytes(gib: float | None) -> int | None:

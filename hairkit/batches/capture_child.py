@@ -10,9 +10,7 @@ from __future__ import annotations
 import errno
 import hashlib
 import os
-import resource
 import shutil
-import sys
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
@@ -21,9 +19,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hairkit import worker
-from hairkit.errors import HairkitError
+from hairkit.errors import HairkitError, one_line
 from hairkit.memory import keep_freed_memory
 from hairkit.progress import Silent
+from hairkit.system import peak_bytes
 
 if TYPE_CHECKING:
     from hairkit.batches.jobs import Job, Settings
@@ -35,8 +34,6 @@ if TYPE_CHECKING:
 THUMBNAIL = "thumbnail.jpg"
 THUMBNAIL_EDGE, THUMBNAIL_QUALITY = 320, 80
 """Long edge in pixels and JPEG quality of the picture in the report: about 15 KB."""
-_RSS_UNIT = 1 if sys.platform == "darwin" else 1024
-"""Bytes in which the system counts the peak memory of a process."""
 
 
 def main() -> None:
@@ -68,7 +65,7 @@ def explain(error: BaseException) -> str:
         named = f"{error.filename}: " if error.filename is not None else ""
         cure = "; free some space and run the batch again" if error.errno == errno.ENOSPC else ""
         return f"{named}{error.strerror or error}{cure}"
-    return " ".join(str(error).split())
+    return one_line(error)
 
 
 def _reconstruct(job: Job, settings: Settings, tell: Callable[[Any], None]) -> dict[str, Any]:
@@ -141,7 +138,7 @@ def _taken(began: float, used: float) -> dict[str, Any]:
     return {
         "seconds": round(time.perf_counter() - began, 3),
         "processor_seconds": round(time.process_time() - used, 3),
-        "peak_bytes": resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _RSS_UNIT,
+        "peak_bytes": peak_bytes(),
     }
 
 

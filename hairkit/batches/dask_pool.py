@@ -19,7 +19,7 @@ from hairkit.batches.jobs import DONE, FAILED, Job, Result, Settings, finished
 from hairkit.batches.pool import Watcher
 from hairkit.batches.run_job import COMMAND, JobLimits, run_job, start_child
 from hairkit.child_process import ChildProcess
-from hairkit.errors import HairkitError, MissingExtraError
+from hairkit.errors import HairkitError, MissingExtraError, one_line
 
 POLL_S = 0.5
 """Seconds between two looks at whether the scheduler is there."""
@@ -113,7 +113,7 @@ class DaskPool:
         if isinstance(error, _distributed().KilledWorker):
             reason = f"the workers that had it were lost {error.allowed_failures + 1} times"
             return Result(job.name, FAILED, job.out, error=reason)
-        line = " ".join(f"{type(error).__name__}: {error}".split())
+        line = one_line(f"{type(error).__name__}: {error}")
         return Result(job.name, FAILED, job.out, error=line)
 
 

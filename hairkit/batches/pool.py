@@ -7,27 +7,23 @@ gives the memory of its process back.
 
 from __future__ import annotations
 
-import os
 import queue
 import threading
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
 from hairkit.batches.jobs import Job, Result, Settings
 from hairkit.batches.run_job import COMMAND, JobLimits, run_job, start_child
 from hairkit.child_process import ChildProcess
+from hairkit.system import available_bytes
 
 FIRST_GUESS = 5 * 2**28
 """Bytes that a capture is expected to take before one has been measured: the sample's eight photos
 of one megapixel take 0.9 to 1.1 GiB with the default recipe."""
 BUDGET_SHARE = 0.8
 """Share of the memory that is free at the start which a batch takes."""
-KIBIBYTE = 2**10
-"""Bytes of what Linux calls kB."""
-CGROUP = Path("/sys/fs/cgroup")
 
 
 class Watcher:
@@ -57,7 +53,7 @@ class LocalPool:
         A job may take the whole budget unless `limits` says less.
         """
         self._workers = workers
-        self._budget = budget_bytes or int(BUDGET_SHARE * free_bytes())
+        self._budget = budget_bytes or int(BUDGET_SHARE * max(available_bytes(), FIRST_GUESS))
         self._limits = replace(limits, memory_bytes=limits.memory_bytes or self._budget)
         self._threads = threads
         self._command = command
@@ -144,28 +140,3 @@ class LocalPool:
                 return False
             self._running += 1
             return True
-
-
-def free_bytes() -> int:
-    """Return the memory that is free on this machine, within the limits of its container."""
-    free = [_meminfo(), *_cgroup()]
-    return max(min(free), FIRST_GUESS)
-
-
-def _meminfo() -> int:
-    try:
-        with open("/proc/meminfo", encoding="ascii") as file:
-            line = next(line for line in file if line.startswith("MemAvailable:"))
-        return int(line.split()[1]) * KIBIBYTE
-    except (OSError, StopIteration, ValueError):
-        return int(os.sysconf("SC_PHYS_PAGES")) * int(os.sysconf("SC_PAGE_SIZE"))
-
-
-def _cgroup() -> list[int]:
-    """Return what the container may still take, nothing where it has no limit."""
-    try:
-        most = (CGROUP / "memory.max").read_text()
-        used = (CGROUP / "memory.current").read_text()
-        return [int(most) - int(used)]
-    except (OSError, ValueError):
-        return []

@@ -50,7 +50,8 @@ import traceback
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
-from hairkit.errors import DivergedError, HairkitError
+from hairkit.errors import DivergedError, HairkitError, one_line
+from hairkit.system import utf8_name
 
 VERBS = {
     "reconstruct": "turn photos of a head, or a video, into a groom",
@@ -117,6 +118,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     words = [word for word in words if word != "--debug"]
     _log_to_stderr(logging.DEBUG if debug else logging.WARNING)
     try:
+        for word in words:
+            utf8_name(word)  # refused before any work
         return _run(words)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # so that the exit's flush stays quiet too
@@ -135,17 +138,17 @@ def explain(error: BaseException) -> tuple[str, int]:
         said = str(error) if isinstance(error, KeyboardInterrupt) else ""
         return f"interrupted; {said or 'run it again to continue where it stopped'}", 2
     if isinstance(error, DivergedError):
-        return _one_line(error), 3
+        return one_line(error), 3
     if isinstance(error, HairkitError):
-        return _one_line(error), 2
+        return one_line(error), 2
     if isinstance(error, MemoryError):
-        return f"out of memory; use smaller pictures or larger voxels ({_one_line(error)})", 2
+        return f"out of memory; use smaller pictures or larger voxels ({one_line(error)})", 2
     if isinstance(error, OSError):
         named = f"{error.filename}: " if error.filename is not None else ""
         cure = "; free some space and run it again" if error.errno == errno.ENOSPC else ""
-        return f"{named}{error.strerror or _one_line(error)}{cure}", 2
+        return f"{named}{error.strerror or one_line(error)}{cure}", 2
     kind = type(error).__name__
-    return f"unexpected {kind}: {_one_line(error)}; run it again with --debug to see where", 1
+    return f"unexpected {kind}: {one_line(error)}; run it again with --debug to see where", 1
 
 
 def _run(words: list[str]) -> int:
@@ -215,8 +218,15 @@ def _log_to_stderr(level: int) -> None:
     logger.setLevel(level)
     if not logger.handlers:
         handler = logging.StreamHandler()
-        handler.setFormatter(logging.Formatter("hairkit: %(levelname)s: %(message)s"))
+        handler.setFormatter(_OneLine("hairkit: %(levelname)s: %(message)s"))
         logger.addHandler(handler)
+
+
+class _OneLine(logging.Formatter):
+    """Writes messages that a terminal shows as they are, whatever file they quote."""
+
+    def formatMessage(self, record: logging.LogRecord) -> str:  # noqa: N802 (logging's name)
+        return one_line(super().formatMessage(record))
 
 
 def _is_interrupt(error: BaseException | None) -> bool:
@@ -224,7 +234,3 @@ def _is_interrupt(error: BaseException | None) -> bool:
     if error is None or isinstance(error, KeyboardInterrupt):
         return error is not None
     return _is_interrupt(error.__cause__ or error.__context__)
-
-
-def _one_line(error: BaseException) -> str:
-    return " ".join(str(error).split())

@@ -111,8 +111,8 @@ def settings_of(args: argparse.Namespace) -> Settings:
 
 def _made(args: argparse.Namespace) -> list[Result]:
     """Return the results of a batch; a lost scheduler of our own is replaced."""
-    from hairkit.batches.batch import core_count
     from hairkit.batches.dask_pool import SchedulerLostError, connect, local_client
+    from hairkit.system import core_count
 
     if not (args.dask or args.scheduler):
         return _run(args, None)

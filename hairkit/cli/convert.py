@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from hairkit.cli.export import check_target
 from hairkit.cli.reader_settings import add_reader_arguments, reader_settings
 from hairkit.cli.settings import add_setting, split_settings
-from hairkit.cli.written import add_json, print_written
+from hairkit.cli.written import add_json, check_target, print_written
 from hairkit.errors import InputError
 from hairkit.grooming.decimate import decimate
 from hairkit.grooming.guide_weights import guide_mask

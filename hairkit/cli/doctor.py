@@ -19,9 +19,11 @@ from types import ModuleType
 from typing import Any, Literal
 
 from hairkit.manager import Manager
+from hairkit.manager.guard import describe_error
 from hairkit.nets.install import is_intact
 from hairkit.nets.known_models import KNOWN_MODELS
 from hairkit.nets.model_folder import model_folder
+from hairkit.system import gl_cure
 from hairkit.version import __version__
 
 _DESCRIPTION = """\
@@ -36,7 +38,6 @@ _MODULES = {"opencv-contrib-python-headless": "cv2"}
 _NO_CACHE = "no locator available"
 """Numba's message if it has no folder for compiled code."""
 
-_GL_CURE = "on Debian: apt-get install libegl1 libgl1 libgl1-mesa-dri libosmesa6"
 
 # Each backend gets a process of its own: only one can be loaded in a process, and drivers crash.
 _TRY_GL = """
@@ -104,8 +105,9 @@ def _package(name: str) -> Finding:
         module = importlib.import_module(_MODULES.get(name, name.replace("-", "_")))
         version = _version(name, module)
     except Exception as error:  # a broken package may raise anything while it is imported
-        reason = " ".join(f"{type(error).__name__}: {error}".split())
-        return Finding(name, "FAIL", f"{reason}; pip install --force-reinstall {name}")
+        return Finding(
+            name, "FAIL", f"{describe_error(error)}; pip install --force-reinstall {name}"
+        )
     return Finding(name, "ok", version)
 
 
@@ -134,7 +136,7 @@ def _graphics() -> Iterator[Finding]:
             yield Finding(f"OpenGL by {backend}", "ok", text)
         else:
             yield Finding(
-                f"OpenGL by {backend}", "note" if works else "FAIL", f"{text}; {_GL_CURE}"
+                f"OpenGL by {backend}", "note" if works else "FAIL", f"{text}; {gl_cure()}"
             )
 
 

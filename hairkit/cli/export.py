@@ -6,17 +6,21 @@ import argparse
 from pathlib import Path
 from typing import Any
 
+from hairkit.api import export_for
 from hairkit.cli.settings import add_setting, importer_of, split_settings
-from hairkit.cli.written import add_json, print_written
+from hairkit.cli.written import add_json, check_target, print_written
 from hairkit.errors import InputError
+from hairkit.grooming.engine_files import ENGINES
 from hairkit.manager import Manager
 from hairkit.pipeline.open_groom import load_groom, plugin_for
 
 _DESCRIPTION = """\
 Example: hairkit export out/groom.npz -o hair.apx
 
-Write a groom in the format of the file's suffix. `hairkit plugins --formats` lists what each format
-carries; `hairkit convert` has more options for the input file."""
+Write a groom in the format of the file's suffix, or with --for all files that an engine takes, as
+its page in the documentation says: `hairkit export out/groom.npz --for unreal -o unreal/`. `hairkit
+plugins --formats` lists what each format carries; `hairkit convert` has more options for the input
+file."""
 
 
 def register(subparsers: Any) -> None:
@@ -26,7 +30,8 @@ def register(subparsers: Any) -> None:
     )
     add = parser.add_argument
     add("groom", metavar="GROOM", help="groom.npz, or a file that an import plugin reads")
-    add("-o", "--out", required=True, metavar="FILE", help="file to write")
+    add("-o", "--out", required=True, metavar="FILE", help="file to write, with --for a folder")
+    add("--for", dest="engine", choices=tuple(ENGINES), help=f"engine: {', '.join(ENGINES)}")
     add_setting(add)
     add("--using", metavar="NAME", help="export plugin (default: by suffix)")
     add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
@@ -37,6 +42,8 @@ def run(args: argparse.Namespace) -> int:
     """Export, and print the file's name."""
     manager = Manager.loaded(args.plugin)
     source, target = Path(args.groom), Path(args.out)
+    if args.engine is not None:
+        return _run_for_engine(args, manager)
     exporter = args.using or plugin_for(manager, "export_groom", target)
     manager.implementer("export_groom", exporter)
     plugins = {"reader": importer_of(manager, source), "writer": exporter}
@@ -49,9 +56,12 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def check_target(path: Path) -> None:
-    """Raise `InputError` if a file cannot be written there, before any work is done."""
-    if not path.parent.is_dir():
-        raise InputError(f"{path.parent}: no such folder; make it first")
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder; name a file")
+def _run_for_engine(args: argparse.Namespace, manager: Manager) -> int:
+    """Export all files of an engine, and print their names."""
+    if args.using is not None:
+        raise InputError(f"--for {args.engine} chooses the plugins; leave --using out")
+    reader = importer_of(manager, Path(args.groom))
+    settings = split_settings(manager, {"reader": reader}, args.set)["reader"]
+    groom = load_groom(manager, Path(args.groom), settings)
+    print_written(args, *export_for(groom, args.engine, args.out, manager=manager))
+    return 0

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from hairkit.cli.settings import STAGE_HELP, add_setting
-from hairkit.cli.written import add_json, print_written
+from hairkit.cli.written import add_json, check_target, print_written
 from hairkit.errors import InputError
 
 _DESCRIPTION = """\
@@ -41,6 +41,7 @@ def run(args: argparse.Namespace) -> int:
 
     if args.output.suffix.lower() not in ENDINGS:
         raise InputError(f"{args.output}: a head is written as {', '.join(ENDINGS)}")
+    check_target(args.output)
     manager = Manager.loaded(args.plugin)
     photos, recipe = take_with_choices(args.photos, args.recipe, manager, args.set)
     with progress_for(sys.stderr, quiet=args.quiet or args.json) as shown:

@@ -12,7 +12,7 @@ import numpy as np
 from hairkit.arrays import Float32Array
 from hairkit.cli.reader_settings import add_reader_arguments, reader_settings
 from hairkit.cli.settings import add_setting, split_settings
-from hairkit.errors import FormatError, InputError
+from hairkit.errors import FormatError, InputError, one_line
 from hairkit.types.groom import Groom
 from hairkit.types.point_cache import PointCache, is_cache_file
 
@@ -21,12 +21,13 @@ Example: hairkit info out/groom.npz
 
 Print what a file contains: a groom (.npz or what an import plugin reads; --scale, --up and --set
 give what bare strands do not define), a simulation (.npz), a scene.json, a head (.obj, .ply, .glb),
-hair cards (.glb, .vrm, .obj), or a capture: a folder, a video, a URL, or what else the recipe's
-stage `capture` takes. Lengths are in metres."""
+an avatar (.vrm), hair cards (.glb, .vrm, .obj), or a capture: a folder, a video, a URL, or what
+else the recipe's stage `capture` takes. Lengths are in metres."""
 
 _OWN = (".npz", ".json")
 """Files that need no libraries to be known."""
-_HEADS = (".obj", ".ply", ".glb")
+_AVATAR = ".vrm"
+_HEADS = (".obj", ".ply", ".glb", _AVATAR)
 _CARDS = (".glb", ".gltf", ".vrm", ".obj")
 
 
@@ -79,11 +80,17 @@ def _facts(path: Path, args: argparse.Namespace) -> dict[str, Any]:
     if path.suffix.lower() not in _HEADS:
         return _groom(path, args)
     try:
-        return _groom(path, args)
+        if path.suffix.lower() != _AVATAR:
+            return _groom(path, args)
     except FormatError:  # no strands in it, so it is a head
-        from hairkit.io.head_reader import read_head
+        pass
+    from hairkit.io.head_reader import read_bare_head, read_head
 
-        return {"kind": "head", **_head(read_head(path, args.head_units, args.head_scalp))}
+    bare = read_bare_head(path, args.head_units, args.head_scalp)
+    if bare.scalp is None:
+        facts = {"vertices": len(bare.vertices), "faces": len(bare.faces), "scalp_vertices": 0}
+        return {"kind": "head", **facts, "bounds_m": _bounds(bare.vertices.astype(np.float32))}
+    return {"kind": "head", **_head(read_head(path, args.head_units, args.head_scalp))}
 
 
 def _cards(path: Path) -> dict[str, Any] | None:
@@ -225,7 +232,7 @@ def _lines(facts: dict[str, Any], indent: str = "") -> list[str]:
         if not isinstance(value, dict):
             lines.append(f"{indent}{name}: {_format_value(value)}")
         elif any(isinstance(item, dict) for item in value.values()):
-            lines += [f"{indent}{name}:", *_lines(value, indent + "  ")]
+            lines += [f"{indent}{one_line(name)}:", *_lines(value, indent + "  ")]
         else:
             inner = ", ".join(f"{key} {_format_value(item)}" for key, item in value.items())
             lines.append(f"{indent}{name}: {inner}")
@@ -239,4 +246,4 @@ def _format_value(value: Any) -> str:
         return " to ".join(_format_value(item) for item in value)
     if isinstance(value, list):
         return f"({', '.join(str(item) for item in value)})"
-    return "unknown" if value is None else str(value)
+    return "unknown" if value is None else one_line(value)

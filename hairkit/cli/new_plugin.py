@@ -6,6 +6,7 @@ import argparse
 from typing import Any
 
 from hairkit.cli.scaffold import new_plugin
+from hairkit.cli.scaffold_sketches import SKETCHES
 from hairkit.cli.written import add_json, print_written
 from hairkit.stages import OF_HOOK, OF_TABLE
 
@@ -21,7 +22,7 @@ def register(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "new-plugin", help="start a plugin of your own", description=_DESCRIPTION
     )
-    others = [hook for hook, stage in OF_HOOK.items() if not stage.in_runs]
+    others = [hook for hook in SKETCHES if hook not in OF_HOOK or not OF_HOOK[hook].in_runs]
     stages = f"a stage of the recipe ({', '.join(OF_TABLE)}) or a hook ({', '.join(others)})"
     parser.add_argument("stage", metavar="STAGE", help=stages)
     parser.add_argument("name", metavar="NAME", help="the plugin's name: lower_case_words")

@@ -93,9 +93,9 @@ def run(args: argparse.Namespace) -> int:
     with progress_for(sys.stderr, quiet=quiet, steps=args.steps) as shown:
         chosen = _chosen(args)
         groom = reconstruct(capture, args.out, recipe, manager, head=head, progress=shown, **chosen)
-    record = read_record(Path(args.out) / RECORD)
+    record, exports = read_record(Path(args.out) / RECORD), export_paths(args.out, recipe, manager)
     summary = _summary(Path(args.out), groom.strands) | {
-        "exports": {name: str(path) for name, path in export_paths(args.out, recipe, manager)},
+        "exports": {c.file or c.plugin: str(path) for c, path in exports},
         "roots": args.guides,
         "stages": [asdict(stage) for stage in record.stages],
         "health": [asdict(figure) for figure in record.health],

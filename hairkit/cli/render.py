@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from hairkit.cli.settings import add_setting, importer_of, split_settings
-from hairkit.cli.written import add_json, print_written
+from hairkit.cli.written import add_json, check_target, print_written
 from hairkit.errors import InputError
 from hairkit.grooming.densify import densify
 from hairkit.imaging.picture_file import write_picture
@@ -75,6 +75,7 @@ def register(subparsers: Any) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Draw and print the names of the pictures."""
+    check_target(args.output)
     groom = _pose_groom(args)
     if not 1 <= args.hairs <= MOST_HAIRS:
         raise InputError(f"--hairs is {args.hairs}, expected 1 to {MOST_HAIRS}")

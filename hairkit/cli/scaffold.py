@@ -24,7 +24,7 @@ def new_plugin(stage: str, name: str, folder: str | os.PathLike[str] | None = No
     Parameters
     ----------
     stage
-        A stage's hook (`build_hull`) or its table in a recipe (`hull`).
+        A hook (`build_hull`, `groom_ready`), or a stage's table in a recipe (`hull`).
     name
         The plugin's name: lower-case letters, digits and underscores.
     folder
@@ -36,8 +36,8 @@ def new_plugin(stage: str, name: str, folder: str | os.PathLike[str] | None = No
         There is no such stage, the name is no plugin's name, or the folder exists.
     """
     hook = OF_TABLE[stage].hook if stage in OF_TABLE else stage
-    if hook not in OF_HOOK:
-        raise InputError(unknown_name("stage", stage, [*OF_TABLE, *OF_HOOK]))
+    if hook not in SKETCHES:
+        raise InputError(unknown_name("stage", stage, [*OF_TABLE, *SKETCHES]))
     if not name.isidentifier() or keyword.iskeyword(name) or name != name.lower():
         raise InputError(
             f"plugin name is {name!r}, expected lower-case letters, digits and underscores"
@@ -59,12 +59,13 @@ def new_plugin(stage: str, name: str, folder: str | os.PathLike[str] | None = No
 def _files(hook: str, name: str) -> dict[str, str]:
     distribution, module = f"hairkit-{name.replace('_', '-')}", f"hairkit_{name}"
     words = {"NAME": name, "DISTRIBUTION": distribution, "MODULE": module, "HOOK": hook}
-    use = _COMMANDS.get(hook, "hairkit reconstruct photos/ -o out/ --set TABLE=NAME")
-    use = use.replace("TABLE", OF_HOOK[hook].name)
+    run = "hairkit reconstruct photos/ -o out/"
+    chosen = f"{run} --set {OF_HOOK[hook].name}=NAME" if hook in OF_HOOK else run
+    use = _COMMANDS.get(hook, chosen)
     texts = {
         "pyproject.toml": _PYPROJECT,
         f"{module}.py": _module(hook),
-        f"tests/test_{name}.py": _TEST,
+        f"tests/test_{name}.py": _TEST.replace("TRY", _TRIES.get(hook, _TRY)),
         "README.md": _README.replace("USE", use),
     }
     for key, word in words.items():
@@ -74,11 +75,11 @@ def _files(hook: str, name: str) -> dict[str, str]:
 
 def _module(hook: str) -> str:
     sketch = SKETCHES[hook]
-    signature = _signature(hook, sketch.body)
+    signature = _signature(hook, sketch)
     words = {
         "SUMMARY": sketch.summary,
         "IMPORTS": _imports(sketch, signature),
-        "OPTION": sketch.option,
+        "OPTIONS": _OPTIONS.replace("OPTION", sketch.option) if sketch.option else "",
         "SIGNATURE": signature,
         "BODY": textwrap.indent(sketch.body.strip(), "    "),
         "BEFORE": sketch.before,
@@ -89,17 +90,19 @@ def _module(hook: str) -> str:
     return text
 
 
-def _signature(hook: str, body: str) -> str:
+def _signature(hook: str, sketch: Sketch) -> str:
     """Return the parameters of a hook that a body uses, and its result, as they are written."""
-    types = getattr(hookspecs, hook).__annotations__
-    used = [name for name in OF_HOOK[hook].takes if re.search(rf"\b{name}\b", body)]
-    parameters = [*(f"{name}: {types[name]}" for name in used), "options: Options"]
-    return f"({', '.join(parameters)}) -> {types['return']}"
+    types = getattr(hookspecs, hook).__annotations__ | {"options": "Options"}
+    result = types.pop("return")
+    used = [name for name in types if re.search(rf"\b{name}\b", sketch.body)]
+    if sketch.option and "options" not in used:
+        used.append("options")
+    return f"({', '.join(f'{name}: {types[name]}' for name in used)}) -> {result}"
 
 
 def _imports(sketch: Sketch, signature: str) -> str:
     """Return the imports of a module: of its method, and of the types that the contract names."""
-    code = "\n".join([*ALWAYS, *sketch.imports])
+    code = "\n".join([*(_ALWAYS if sketch.option else _ALWAYS[:1]), *sketch.imports])
     contract = _taken(inspect.getsource(hookspecs))
     words = {*re.findall(r"\w+", signature + sketch.body + sketch.before)}
     taken = _taken(code) | {name: contract[name] for name in words & contract.keys()}
@@ -110,7 +113,7 @@ def _imports(sketch: Sketch, signature: str) -> str:
     standard = [line for line in modules if not line.startswith(("from hairkit", "from scipy"))]
     plain = [line for line in code.splitlines() if line.startswith("import")]
     others = [line for line in modules if line not in standard]
-    return "\n".join([*standard, "", *plain, *others])
+    return "\n".join([*standard, "", *plain, *others]).strip()
 
 
 def _taken(code: str) -> dict[str, str]:
@@ -119,15 +122,17 @@ def _taken(code: str) -> dict[str, str]:
     return {alias.name: str(node.module) for node in found for alias in node.names}
 
 
-ALWAYS = (
-    "from dataclasses import dataclass",
+_ALWAYS = (
     "from hairkit.hookspecs import hookimpl",
+    "from dataclasses import dataclass",
     "from hairkit.options import option",
 )
+"""Imports of each module; the first is that of a hook without options, too."""
 _COMMANDS = {
     "make_simulator": "hairkit simulate out/groom.npz -o cache.npz --using NAME",
     "export_groom": "hairkit export out/groom.npz -o hair.NAME",
     "import_groom": "hairkit convert hair.NAME hair.abc",
+    "validate_groom": "hairkit validate hair.abc --for unreal",
 }
 """Commands that use plugins of hooks which a recipe alone does not choose."""
 
@@ -168,19 +173,26 @@ _TEST = '''\
 
 from pathlib import Path
 
+from hairkit import testing
 from hairkit.manager import Manager
-from hairkit.testing import stage_arguments
 
 import MODULE
 
 
 def test_obeys_the_contract(tmp_path: Path) -> None:
-    """On a small made-up head the plugin returns what the stage `HOOK` asks for."""
+    """On a small made-up head the plugin does what the hook `HOOK` asks for."""
     manager = Manager()
     manager.register(MODULE, "NAME")
-    arguments = stage_arguments("HOOK", tmp_path)
-    assert manager.call("HOOK", "NAME", **arguments) is not None
+    TRY
 '''
+_TRY = """arguments = testing.stage_arguments("HOOK", tmp_path)
+    assert manager.call("HOOK", "NAME", **arguments) is not None"""
+_TRIES = {
+    "validate_groom": 'assert manager.findings(testing.bristle_groom(), tmp_path, "unreal")',
+    "stage_finished": 'MODULE.stage_finished("orient", 1.5)',
+    "groom_ready": "MODULE.groom_ready(testing.bristle_groom())",
+}
+"""What a test does with the plugin of a hook that is no stage."""
 
 _MODULE = '''\
 """SUMMARY"""
@@ -189,16 +201,17 @@ from __future__ import annotations
 
 IMPORTS
 BEFORE
-
+OPTIONS
+@hookimpl
+def HOOKSIGNATURE:
+    """Replace this body by your method; what comes in and goes out is in docs/plugins.md."""
+BODY
+'''
+_OPTIONS = '''
 @dataclass(frozen=True)
 class Options:
     """Settings of NAME."""
 
     OPTION
 
-
-@hookimpl
-def HOOKSIGNATURE:
-    """Replace this body by your method; what comes in and goes out is in docs/plugins.md."""
-BODY
 '''

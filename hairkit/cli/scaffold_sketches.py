@@ -1,4 +1,4 @@
-"""The simplest method for every stage hook, from which `hairkit new-plugin` writes a module."""
+"""The simplest method for every hook, from which `hairkit new-plugin` writes a module."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ class Sketch:
     imports: tuple[str, ...]
     """Besides those of the types in the hook's signature."""
     option: str
+    """Empty for a hook without options."""
     body: str
     before: str = ""
     """Code between the imports and the options."""
@@ -268,6 +269,28 @@ FORMAT = FileFormat(
     partial={Feature.POINTS: "one strand of `every`"},
 )
 """,
+    ),
+    "validate_groom": Sketch(
+        "Strands must be shorter than the studio's longest wig.",
+        ("from hairkit.types.finding import Finding",),
+        "",
+        """
+longest = float(groom.strands.lengths().max())
+said = f"the longest strand has {longest:.2f} m, expected {LONGEST}"
+return [Finding.of("wig-length", longest <= LONGEST, said)]""",
+        before="\nLONGEST = 0.8\n",
+    ),
+    "stage_finished": Sketch(
+        "Tells when stages end.",
+        ("import sys",),
+        "",
+        'print(f"{stage} took {seconds:.2f} s", file=sys.stderr)',
+    ),
+    "groom_ready": Sketch(
+        "Tells how much hair a run has made.",
+        ("import sys",),
+        "",
+        'print(f"{len(groom.strands)} strands", file=sys.stderr)',
     ),
 }
 """The method of each hook."""

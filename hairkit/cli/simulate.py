@@ -13,7 +13,7 @@ import numpy as np
 
 from hairkit.arrays import Float64Array
 from hairkit.cli.settings import add_setting, importer_of, split_settings
-from hairkit.cli.written import add_json, print_written
+from hairkit.cli.written import add_json, check_target, print_written
 from hairkit.errors import InputError
 
 if TYPE_CHECKING:
@@ -143,8 +143,7 @@ def _check(args: argparse.Namespace) -> None:
         raise InputError(f"--warm-up is {args.warm_up}, expected 0 to {LONGEST_WARM_UP} seconds")
     if not 0 <= args.turbulence <= 10:
         raise InputError(f"--turbulence is {args.turbulence}, expected 0 to 10 times the wind")
-    if not args.out.parent.is_dir():
-        raise InputError(f"{args.out.parent}: no such folder; make it first")
+    check_target(args.out)
 
 
 def _vector(name: str, text: str) -> Float64Array:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hairkit.cli.settings import SET_HELP, add_setting, split_settings
-from hairkit.cli.written import add_json, print_written
+from hairkit.cli.written import add_json, check_target, print_written
 from hairkit.errors import InputError
 
 if TYPE_CHECKING:
@@ -67,6 +67,7 @@ def run(args: argparse.Namespace) -> int:
     for path in outputs:
         if path.suffix.lower() != ".png":
             raise InputError(f"{path}: textures are written as .png")
+        check_target(path)
     given = read_texture(args.file)
     made = (
         _tint(args, given) if args.work == "tint" else _relief(args, given) or _enhance(args, given)

@@ -10,7 +10,7 @@ from typing import Any
 
 from hairkit.cli.reader_settings import add_reader_arguments, reader_settings
 from hairkit.cli.settings import add_setting, split_settings
-from hairkit.errors import FormatError, InputError
+from hairkit.errors import FormatError, InputError, one_line
 from hairkit.grooming.target_rules import TARGETS, check_groom
 from hairkit.manager import Manager
 from hairkit.pipeline.open_groom import load_groom, plugin_for
@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     else:
         width = max(len(finding.rule) for finding in found)
         for finding in found:
-            print(f"{finding.level:8}{finding.rule:{width + 2}}{finding.text}")
+            print(f"{finding.level:8}{finding.rule:{width + 2}}{one_line(finding.text)}")
     return BROKEN if any(finding.level == "failed" for finding in found) else 0
 
 
@@ -68,7 +68,7 @@ def _findings(args: argparse.Namespace) -> list[Finding]:
             wanted = " ".join(f"--set {name}={value}" for name, value in as_target.items())
             said = f"not in the axes and the unit that {args.target} reads; export with {wanted}"
             return [Finding("unit", "failed", said)]
-        return [Finding("reads", "failed", " ".join(str(error).split()))]
+        return [Finding("reads", "failed", one_line(error))]
     read = Finding("reads", "passed", f"{len(groom.strands)} strands")
     rules = check_groom(groom, args.file, args.target)
     return [read, *rules, *manager.findings(groom, args.file, args.target)]

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from hairkit.cli.export import check_target
 from hairkit.cli.settings import add_setting, importer_of, split_settings
-from hairkit.cli.written import add_json, print_written
+from hairkit.cli.written import add_json, check_target, print_written
 from hairkit.errors import InputError
 from hairkit.io.head_reader import UNITS, BareHead, read_bare_head
 from hairkit.manager import Manager

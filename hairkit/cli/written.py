@@ -6,7 +6,10 @@ import argparse
 import json
 import os
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
+
+from hairkit.errors import InputError
 
 
 def add_json(add: Callable[..., Any]) -> None:
@@ -26,3 +29,11 @@ def print_written(
         print(json.dumps({"files": names, **more}, indent=1))
     else:
         print("\n".join(lines or names))
+
+
+def check_target(path: Path) -> None:
+    """Raise `InputError` if a file cannot be written there, before any work is done."""
+    if not path.parent.is_dir():
+        raise InputError(f"{path.parent}: no such folder; make it first")
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; name a file")

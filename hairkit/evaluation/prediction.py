@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from hairkit.arrays import Int64Array
 from hairkit.errors import InputError
@@ -40,22 +40,25 @@ class Prediction:
     """Labels of every view, or None when the work folder does not hold them."""
 
     def in_order_of(self, truth: Truth) -> Prediction:
-        """Return the prediction with its views in the truth's order, by name where names agree."""
-        if len(self.cameras) != len(truth.cameras):
+        """Return the prediction with the truth's views, in its order, by name where names agree.
+
+        Views of which the truth says nothing, such as a photo from above, are left out. Raises
+        `InputError` where names do not agree and there are more or fewer.
+        """
+        known = set(truth.names) <= set(self.names) and len(set(self.names)) == len(self.names)
+        if not known and len(self.cameras) != len(truth.cameras):
             raise InputError(
                 f"the prediction has {len(self.cameras)} views, the truth {len(truth.cameras)}: "
                 "give the truth of the same capture"
             )
-        if sorted(self.names) != sorted(truth.names) or len(set(self.names)) < len(self.names):
+        if not known:
             return self
         order = [self.names.index(name) for name in truth.names]
-        return Prediction(
-            self.groom,
-            truth.names,
-            tuple(self.cameras[i] for i in order),
-            None if self.orientations is None else tuple(self.orientations[i] for i in order),
-            None if self.masks is None else tuple(self.masks[i] for i in order),
-        )
+        changes: dict[str, Any] = {"names": truth.names}
+        for name in ("cameras", "orientations", "masks"):
+            if getattr(self, name) is not None:
+                changes[name] = tuple(getattr(self, name)[i] for i in order)
+        return replace(self, **changes)
 
 
 def read_prediction(

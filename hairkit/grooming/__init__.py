@@ -7,6 +7,7 @@ Make a groom of tracked or imported strands, thin it out or fill it up, and prep
 * `cover_hair`: strands led through hair that no other reaches
 * `decimate`: guides chosen from full hair
 * `densify`: full hair interpolated between guides
+* `engine_files`: what an engine takes of a groom
 * `fringe`: strands that hang loose beside tied hair
 * `guide_weights`: the nearest guides of each hair, and hair that follows them
 * `head_collision`: strand points pushed out of the head

@@ -248,14 +248,17 @@ def _usd(groom: Groom, path: Path) -> Iterator[Finding]:
     yield from _roots_on_mesh(groom, path)
 
 
-_ALEMBIC = (".abc",)
+_ALEMBIC, _USD = (".abc",), (".usdc", ".usda", ".usd")
 TARGETS = {
-    "unreal": Target((*_ALEMBIC, ".usdc", ".usda", ".usd"), (_unreal,), (("axis", "unreal"),)),
+    "unreal": Target((*_ALEMBIC, *_USD), (_unreal,), (("axis", "unreal"),)),
     "metahuman": Target(_ALEMBIC, (_unreal,), (("axis", "unreal"),)),
     "unity": Target(_ALEMBIC, (_unity,)),
     "hairworks": Target((".apx",), (_hairworks,)),
     "tressfx": Target((".tfx",), (_tressfx,)),
     "web": Target((".glb", ".gltf"), (_web,)),
-    "usd": Target((".usdc", ".usda", ".usd"), (_usd,)),
+    "usd": Target(_USD, (_usd,)),
+    "blender": Target((*_ALEMBIC, *_USD, ".glb", ".ply", ".obj"), ()),
+    "maya": Target((*_ALEMBIC, *_USD, ".ma"), (), (("axis", "y_up_centimetres"),)),
+    "houdini": Target((*_ALEMBIC, *_USD), ()),
 }
 """Targets of `hairkit validate --for`."""

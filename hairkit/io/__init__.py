@@ -17,6 +17,7 @@ every size before they ask for memory. Grooms and caches save and load themselve
 * `glb_mesh`: the triangle mesh of a glTF file
 * `glb_motion`: the motion of a head in a glTF file
 * `glb_skin`: texture maps and morph targets of glTF meshes
+* `head_landmarks`: landmarks beside a mesh of a head
 * `head_reader`: heads from OBJ, PLY and GLB
 * `heic`: HEIC photos, by an optional library
 * `mesh_text`: triangle meshes of OBJ and PLY files

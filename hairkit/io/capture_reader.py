@@ -6,7 +6,9 @@ Either the photos lie in the folder itself, or in its `photos/` beside `masks/`,
 
 from __future__ import annotations
 
+import difflib
 import json
+import logging
 import os
 import re
 from collections.abc import Iterable
@@ -59,6 +61,7 @@ WORKING_EDGE = 1440
 _PHOTO_SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".heic", ".heif")
 _OTHER_SUFFIXES = (".bmp", ".gif", ".dng", ".avif", ".jxl", ".cr2", ".cr3", ".nef", ".arw")
 _LANDMARKS = 68
+_log = logging.getLogger(__name__)
 _MAX_LANDMARK_BYTES = 2**22
 """68 points of a view are some 2.5 kB of JSON."""
 
@@ -182,6 +185,11 @@ def _places(photos: list[Path], settings: CaptureFile, photo_folder: Path) -> li
     named = [_view_name(photo) for photo in photos]
     if not set(named) & set(NAMES):
         return [_unnamed(photo, index, len(photos)) for index, photo in enumerate(photos)]
+    silent = [photo for photo, name in zip(photos, named, strict=True) if _says_nothing(name)]
+    if silent:
+        _log.warning("%s: its name tells no view, so those of the others do not count", silent[0])
+        unnamed = [_unnamed(photo, index, len(photos)) for index, photo in enumerate(photos)]
+        return [replace(place, name=f"view-{i + 1}") for i, place in enumerate(unnamed)]
     for photo, name in zip(photos, named, strict=True):
         if name not in NAMES:
             raise InputError(f"{photo}: {unknown_name('view', name, NAMES)}; rename the photo")
@@ -189,6 +197,11 @@ def _places(photos: list[Path], settings: CaptureFile, photo_folder: Path) -> li
             raise InputError(f"{photo}: there are two photos of the view {name!r}; remove one")
     by_name = dict(zip(named, photos, strict=True))
     return [_Place(by_name[name], name, *_direction(name)) for name in NAMES if name in by_name]
+
+
+def _says_nothing(name: str) -> bool:
+    """Return whether a photo's name, such as a camera's own, is not even a misspelt view."""
+    return name not in NAMES and not difflib.get_close_matches(name, NAMES, 1)
 
 
 def _direction(name: str) -> tuple[float, float]:

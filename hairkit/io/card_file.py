@@ -13,6 +13,7 @@ from hairkit.io.glb_file import GlbFile, readable
 from hairkit.storage import read_bytes
 
 _LEVEL = re.compile(r"cards_LOD(\d{1,3})")
+_BONE = re.compile(r"hair_\d+_\d+")
 _DOCUMENTS = (".glb", ".gltf", ".vrm")
 
 
@@ -49,9 +50,11 @@ def _of_document(file: GlbFile) -> CardFile | None:
             triangles[str(mesh["name"])] = int(sum(corners)) // 3
     if not triangles:
         return None
-    names = {str(node.get("name", "")) for node in document.get("nodes", [])}
+    names = [str(node.get("name", "")) for node in document.get("nodes", [])]
     springs = document.get("extensions", {}).get("VRMC_springBone", {}).get("springs", [])
-    return CardFile(triangles, sum(name.startswith("hair_") for name in names), len(springs))
+    return CardFile(
+        triangles, sum(_BONE.fullmatch(name) is not None for name in names), len(springs)
+    )
 
 
 def _of_text(data: bytes) -> CardFile | None:

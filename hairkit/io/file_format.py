@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -48,6 +49,13 @@ class FileFormat:
     """Comes back changed; the text says how: `mean of each strand`."""
     written: Set[Feature] = frozenset()
     """Written for other programs, not read back here (formats without importer: everything)."""
+    needs: str = ""
+    """Module without which the format is not there, of an extra that may not be installed."""
+
+    @property
+    def there(self) -> bool:
+        """Whether this installation reads or writes the format."""
+        return not self.needs or importlib.util.find_spec(self.needs) is not None
 
     def state(self, feature: Feature) -> str:
         """Return the matrix's cell: `yes`, `written`, the text of `partial`, or empty for lost."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import struct
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -36,10 +37,19 @@ class Document:
         self._arrays: list[npt.NDArray[Any] | Streamed] = []
         self._pictures: dict[bytes, int] = {}
         self._end = 0
+        self._named: Counter[tuple[str, str]] = Counter()
 
     def add(self, kind: str, **item: Any) -> int:
-        """Append an object to the list `kind`, fields of None left out; return its number."""
+        """Append an object to the list `kind`, fields of None left out; return its number.
+
+        Nodes and meshes have names of their own, as programs that go by names demand: what further
+        levels of detail repeat gets the level behind its name.
+        """
         items = self.json.setdefault(kind, [])
+        if kind in ("nodes", "meshes"):
+            again = self._named[kind, item["name"]]
+            self._named[kind, item["name"]] += 1
+            item["name"] += f"_LOD{again}" if again else ""
         items.append({name: value for name, value in item.items() if value is not None})
         return len(items) - 1
 

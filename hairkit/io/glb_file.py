@@ -23,7 +23,7 @@ import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from hairkit.arrays import Float64Array
-from hairkit.errors import DataError, FormatError, HairkitError
+from hairkit.errors import DataError, FormatError, HairkitError, one_line
 from hairkit.storage import MAX_FILE_BYTES, read_bytes
 
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -55,7 +55,7 @@ def readable(source: str | os.PathLike[str], what: str) -> Iterator[None]:
     except KeyError as error:
         raise FormatError(f"{source}: not a readable {what} ({error} is missing)") from error
     except (ValueError, IndexError, TypeError, AttributeError, struct.error) as error:
-        reason = " ".join(str(error).split())[:200]
+        reason = one_line(error)[:200]
         raise FormatError(f"{source}: not a readable {what} ({reason})") from error
     except (RecursionError, OverflowError, MemoryError) as error:
         raise FormatError(f"{source}: not a readable {what} (too deep or too large)") from error

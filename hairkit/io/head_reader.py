@@ -17,16 +17,17 @@ from hairkit.head_model.carry_scalp import transfer_scalp
 from hairkit.head_model.reach import Reach
 from hairkit.head_model.template import default_head
 from hairkit.io.glb_mesh import read_glb
+from hairkit.io.head_landmarks import read_landmarks
 from hairkit.io.mesh_text import FileMesh, obj_side_files, read_obj, read_ply
 from hairkit.io.photos import read_drawing
 from hairkit.io.textures import as_maps, write_mtl
-from hairkit.storage import read_text, write_text
+from hairkit.storage import write_text
 from hairkit.types.head import Capsules, Head
 from hairkit.types.skin import Blendshape, SkinMaps
 
 UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 """Metres in one unit of a head file."""
-_READERS = {".obj": read_obj, ".ply": read_ply, ".glb": read_glb}
+_READERS = {".obj": read_obj, ".ply": read_ply, ".glb": read_glb, ".vrm": read_glb}
 _DEFAULT_BREADTH, _NARROWEST, _BROADEST = 0.155, 0.05, 0.6
 """Breadths in metres: the default head's, a doll's, a statue's; others are in another unit."""
 _OFF_CENTRE = 0.02
@@ -39,7 +40,6 @@ _LEVEL_BREADTHS = 0.1
 """Half the height, in head breadths, of the slice that gives the cranium's depth."""
 _WHITE = 0.75
 """Brightness that painted scalp reaches and bare skin does not, of 1."""
-_MAX_LANDMARK_BYTES = 2**20
 _TOP_OVER_BREADTH = 0.452
 """Height of the crown over the head's centre, in head breadths."""
 _HOW_TO_MARK = (
@@ -244,7 +244,7 @@ def _file_mesh(file: Path, units: str, up: str) -> FileMesh:
     if up not in ("y", "z"):
         raise InputError(f"the head's up axis is {up!r}, expected y or z")
     if file.suffix.lower() not in _READERS:
-        raise FormatError(f"{file}: a head must be an .obj, .ply or .glb file")
+        raise FormatError(f"{file}: a head must be an .obj, .ply, .glb or .vrm file")
     return _READERS[file.suffix.lower()](file)
 
 
@@ -348,26 +348,15 @@ def _breadth_and_middle(
 
 def _landmarks(file: Path, vertices: Float64Array, units: str, up: str) -> Int32Array | None:
     """(68,) vertices named by, or nearest to the points in, NAME.landmarks.json."""
-    path = _beside(file, "landmarks.json")
-    if not os.path.lexists(path):
-        return None
-    text = read_text(path, _MAX_LANDMARK_BYTES)
-    try:
-        data = json.loads(text)
-        values = np.array(data["landmarks"] if isinstance(data, dict) else data, np.float64)
-    except (ValueError, TypeError, KeyError, OverflowError, RecursionError) as error:
-        raise FormatError(f"{path}: not a JSON list of 68 landmarks ({error})") from error
-    if values.shape not in ((68,), (68, 3)) or not np.isfinite(values).all():
-        raise FormatError(f"{path}: expected 68 vertex numbers or 68 points, all finite")
-    if values.ndim == 1:
-        if (values % 1 != 0).any() or values.min() < 0 or values.max() >= len(vertices):
-            raise FormatError(f"{path}: a landmark names a vertex the head does not have")
-        return values.astype(np.int32)
+    values = read_landmarks(file, len(vertices))
+    if values is None or values.ndim == 1:
+        return None if values is None else values.astype(np.int32)
     points = _in_metres(values, units, up)
     apart, nearest = cKDTree(vertices).query(points)
     if apart.max() > _LANDMARK_GAP:
         raise InputError(
-            f"{path}: a landmark is {1e3 * apart.max():.0f} mm from the head; same units and axes?"
+            f"{_beside(file, 'landmarks.json')}: a landmark is {1e3 * apart.max():.0f} mm from the"
+            " head; same units and axes?"
         )
     return np.asarray(nearest, np.int32)
 

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float64Array, Int64Array
-from hairkit.errors import FormatError
+from hairkit.errors import FormatError, one_line
 from hairkit.io.textures import read_maps, read_mtl
 from hairkit.storage import read_bytes
 from hairkit.types.skin import Texture
@@ -260,7 +260,7 @@ def read_ply(path: str | os.PathLike[str]) -> FileMesh:
             mesh = _ply_mesh(load_ply(io.BytesIO(data), fix_texture=False, skip_materials=True))
             named = _PLY_TEXTURE.search(data[: data.find(b"end_header")])
     except Exception as error:  # trimesh raises almost anything on damaged files
-        reason = " ".join(f"{type(error).__name__}: {error}".split())[:_MAX_REASON]
+        reason = one_line(f"{type(error).__name__}: {error}")[:_MAX_REASON]
         raise FormatError(f"{path}: not a readable PLY mesh ({reason})") from error
     if named is not None and mesh.uv is not None:
         picture = Path(named[1].decode("latin-1").replace("\\", "/")).name

@@ -249,13 +249,16 @@ def _scan_jpeg(data: bytes) -> tuple[int, int, bytes]:
 def _loses_data(data: bytes, pixels: npt.NDArray[Any]) -> bool:
     """Return whether some of a sequential JPEG file's picture data is missing.
 
-    Decoders fill what is missing with mid-grey blocks. Where there are such blocks, the picture is
-    decoded once as it is and once with noise after the data of each scan and restart interval: a
-    decoder that has all its data ignores what follows, one that lacks some uses it. (This is not
-    done to every picture, because the decoder prints a warning about the noise.)
+    Decoders fill what is missing with mid-grey blocks, up to the end of a scan or restart interval.
+    Where a picture ends so, or has such blocks in one of many intervals, it is decoded once as it
+    is and once with noise after the data of each: a decoder that has all its data ignores what
+    follows, one that lacks some uses it. (This is not done to every picture, because the decoder
+    prints a warning about the noise.)
     """
     pieces, frame = _jpeg_pieces(data)
-    if frame not in _SEQUENTIAL_FRAMES or not _has_grey_block(pixels):
+    one_run = len(pieces) == 2  # the other one is the end of the file
+    grey = (pixels[-1, -1] == _MID_GREY).all() if one_run else _has_grey_block(pixels)
+    if frame not in _SEQUENTIAL_FRAMES or not grey:
         return False
     whole, padded = (
         cv2.imdecode(np.frombuffer(each, np.uint8), _THUMBNAIL | _AS_STORED)
@@ -266,9 +269,6 @@ def _loses_data(data: bytes, pixels: npt.NDArray[Any]) -> bool:
 
 def _has_grey_block(pixels: npt.NDArray[Any]) -> bool:
     """Return whether a block of a picture, which may be decoded at half its size, is mid-grey."""
-    corners = (pixels[::_BLOCK, ::_BLOCK] == _MID_GREY).all(axis=-1)
-    if not corners.any():
-        return False
     rows, columns = (edge // _BLOCK for edge in pixels.shape[:2])
     grey = (pixels[: rows * _BLOCK, : columns * _BLOCK] == _MID_GREY).all(axis=-1)
     return bool(grey.reshape(rows, _BLOCK, columns, _BLOCK).all(axis=(1, 3)).any())

@@ -47,7 +47,7 @@ moves by about 90."""
 WINDOW = 0.3
 """Half the way between two places, as its share, in which the sharpest frame is looked for."""
 LEAST_READABLE = 0.9
-"""Share of the frames, of those that the file claims, that must be there."""
+"""Share of the seconds that the file claims which must be there."""
 TIME_LIMIT_S = 600.0
 """Seconds to decode a video; 4K decodes at ten frames a second on a slow core."""
 
@@ -67,9 +67,9 @@ def read_video(path: Path, max_edge: int, count: int = FRAMES) -> Capture:
     """
     open_file(path).close()
     found = _decode("scan", path, width=SMALL_WIDTH, most=MOST_SCANNED)
-    numbers, claimed, read = found["numbers"], int(found["claimed"]), int(found["read"])
+    numbers, claimed, read = found["numbers"], float(found["claimed"]), float(found["read"])
     if read < LEAST_READABLE * claimed:
-        raise FormatError(f"{path}: only {read} of {claimed} frames can be read; save it again")
+        raise FormatError(f"{path}: only {read:.1f} of {claimed:.1f} s can be read; save it again")
     if len(numbers) < count:
         raise InputError(f"{path}: {len(numbers)} frames, expected a turn of at least {count}")
     chosen = choose_frames(frame_motion(found["small"]), found["sharp"], count, str(path))

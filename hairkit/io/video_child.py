@@ -2,7 +2,7 @@
 
 Asked for a `video`, it writes the arrays `out`, an .npz file, or answers why it is `refused`.
 
-* `scan`: small grey frames of a `width`, at most twice as many as `most`, numbers and sharpness
+* `scan`: small grey frames of a `width`, `most` to twice as many, their numbers and sharpness
 * `pick`: the frames with these `numbers`, scaled down to the `edge`
 """
 
@@ -21,15 +21,24 @@ def scan(video: Any, width: int, most: int) -> dict[str, Any]:
     """Return small grey frames (N, H, W), their numbers (N,) and sharpness (N,).
 
     Sharpness is the variance of the Laplacian (Pech-Pacheco et al. 2000), at four times the width.
+    Seconds are compared with those that the file claims, not frames: Matroska has no count of them,
+    and their rate may vary. Recordings of browsers claim nothing.
     """
-    claimed = max(int(video.get(cv2.CAP_PROP_FRAME_COUNT)), 0)
-    every = max(1, claimed // most)
+    frames, rate = (video.get(k) for k in (cv2.CAP_PROP_FRAME_COUNT, cv2.CAP_PROP_FPS))
+    lasts = 1 / rate if rate > 0 else 0.0
+    claimed = max(frames * lasts, 0.0)
+    every = max(1, int(frames) // most)
     small: list[Any] = []
     numbers: list[int] = []
     sharp: list[float] = []
-    number = 0
+    number, read = 0, 0.0
     while video.grab():
-        if number % every == 0 and len(numbers) < 2 * most:
+        read = max(read, video.get(cv2.CAP_PROP_POS_MSEC) / 1000 + lasts)
+        if number % every == 0:
+            if len(numbers) == 2 * most:  # longer than it claims
+                every *= 2
+                for kept in (small, numbers, sharp):
+                    del kept[1::2]
             decoded, frame = video.retrieve()
             if not decoded or frame is None:
                 break
@@ -40,7 +49,7 @@ def scan(video: Any, width: int, most: int) -> dict[str, Any]:
             sharp.append(float(cv2.Laplacian(middle, cv2.CV_32F).var()))
             numbers.append(number)
         number += 1
-    return {"claimed": claimed, "read": number, "small": small, "numbers": numbers, "sharp": sharp}
+    return {"claimed": claimed, "read": read, "small": small, "numbers": numbers, "sharp": sharp}
 
 
 def pick(video: Any, edge: int, numbers: list[int]) -> dict[str, Any]:

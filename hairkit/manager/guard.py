@@ -9,7 +9,7 @@ from contextvars import ContextVar
 from pathlib import Path
 from typing import Any, TextIO
 
-from hairkit.errors import DataError, HairkitError, PluginError, ResultError
+from hairkit.errors import DataError, HairkitError, PluginError, ResultError, one_line
 
 _in_plugin: ContextVar[bool] = ContextVar("in_plugin", default=False)
 
@@ -93,11 +93,6 @@ def describe_error(error: BaseException) -> str:
     except Exception:  # a plugin's own error class may be broken, too
         text = "(no text)"
     return one_line(f"{type(error).__name__}: {text}" if text else type(error).__name__)
-
-
-def one_line(text: object) -> str:
-    """Return a text without line breaks."""
-    return " ".join(str(text).split())
 
 
 def _about_file(error: OSError, path: Path | None) -> bool:

@@ -19,9 +19,9 @@ from typing import Any
 import pluggy
 
 from hairkit import hookspecs
-from hairkit.errors import DataError, HairkitError, OptionError, PluginError
+from hairkit.errors import DataError, HairkitError, OptionError, PluginError, one_line
 from hairkit.manager.command_plugin import CommandPlugin, PluginCommand
-from hairkit.manager.guard import describe_error, guard_hook, one_line, quiet_stdout, subject
+from hairkit.manager.guard import describe_error, guard_hook, quiet_stdout, subject
 from hairkit.manager.loading import (
     DISABLE_AUTOLOAD,
     PluginInfo,
@@ -32,7 +32,7 @@ from hairkit.manager.loading import (
 from hairkit.manager.manifest import Manifest, find_manifests
 from hairkit.manager.results import Call, check_result
 from hairkit.options import make_options, unknown_name
-from hairkit.stages import renamed
+from hairkit.stages import EXPORT, renamed
 from hairkit.types.finding import Finding
 from hairkit.types.groom import Groom
 
@@ -278,10 +278,15 @@ class Manager:
         if options is None or isinstance(options, Mapping):
             options = self.options(plugin, options or {})
         call = Call.of(arguments)
-        with guard_hook(str(info), stage, arguments):
-            result = self._caller(stage, plugin)(**arguments, options=options)
-            if result is not None:
-                check_result(stage, result, call)
+        try:
+            with guard_hook(str(info), stage, arguments):
+                result = self._caller(stage, plugin)(**arguments, options=options)
+                if result is not None:
+                    check_result(stage, result, call)
+        except BaseException:
+            if stage == EXPORT.hook:
+                call.remove_half_file()
+            raise
         return result
 
     def _caller(self, hook: str, plugin: str) -> pluggy.HookCaller:

@@ -37,9 +37,10 @@ class Call:
     """A stage's call: its arguments, and the state before it."""
 
     arguments: Mapping[str, Any]
-    old_file: tuple[int, int, int] | None
-    """Inode, size and time of the file that an export will replace; None where there is none, or
-    where it is too new for its time to tell whether it was replaced."""
+    before: tuple[int, int, int] | None
+    """Inode, size and time of the file that an export will replace; None where there is none."""
+    fresh: bool
+    """Whether it is too new for its time to tell whether it was replaced."""
 
     @classmethod
     def of(cls, arguments: Mapping[str, Any]) -> Call:
@@ -47,7 +48,13 @@ class Call:
         path = arguments.get("path")
         state = None if path is None else _file_state(path)
         fresh = state is not None and time.time() - state[2] / 1e9 < CLOCK_STEP_S
-        return cls(arguments, None if fresh else state)
+        return cls(arguments, state, fresh)
+
+    def remove_half_file(self) -> None:
+        """Remove what an export that failed has left under the name of its file, not an old one."""
+        path = self.arguments["path"]
+        if path.is_file() and _file_state(path) != self.before:
+            path.unlink()
 
 
 def check_result(hook: str, result: object, call: Call) -> None:
@@ -207,7 +214,7 @@ def _wrote_the_file(written: bool, call: Call) -> None:
         raise DataError("no file was written")
     if not path.stat().st_size:
         raise DataError("the file that was written is empty")
-    if call.old_file is not None and _file_state(path) == call.old_file:
+    if call.before is not None and not call.fresh and _file_state(path) == call.before:
         raise DataError("nothing was written; the file there is an older one")
 
 

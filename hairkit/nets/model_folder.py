@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Iterable
 from pathlib import Path
 
 from hairkit.nets.known_models import known_model
+from hairkit.system import data_folder
 
 VARIABLE = "HAIRKIT_MODELS"
 """Environment variable that names another folder of models."""
@@ -16,7 +16,7 @@ VARIABLE = "HAIRKIT_MODELS"
 def model_folder() -> Path:
     """Return the folder of model files; it need not exist."""
     chosen = os.environ.get(VARIABLE)
-    return Path(chosen).expanduser() if chosen else _data_folder() / "hairkit" / "models"
+    return Path(chosen).expanduser() if chosen else data_folder() / "hairkit" / "models"
 
 
 def find_model(name: str) -> Path | None:
@@ -33,13 +33,3 @@ def find_model(name: str) -> Path | None:
 def missing_models(names: Iterable[str]) -> tuple[str, ...]:
     """Return those of `names` that are not installed, in their order."""
     return tuple(name for name in names if find_model(name) is None)
-
-
-def _data_folder() -> Path:
-    """Return the user's folder for data of programs, by the platform's convention."""
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA") or Path.home() / "AppData" / "Local")
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Application Support"
-    chosen = os.environ.get("XDG_DATA_HOME", "")
-    return Path(chosen) if os.path.isabs(chosen) else Path.home() / ".local" / "share"

@@ -8,6 +8,8 @@ scale = 0.5
 [orient]
 plugin = "gabor"
 angles = 64                          # options of the only plugin
+[export]
+for = ["unreal", "web"]              # beside its plugins: all files of an engine
 [plugins.matte]                      # a plugin that runs in an environment of its own
 command = ["/opt/nets/bin/python", "matte.py"]
 
@@ -31,6 +33,7 @@ from types import MappingProxyType
 from typing import Any, TypeVar, cast
 
 from hairkit.errors import HairkitError, InputError, OptionError, PluginError
+from hairkit.grooming.engine_files import ENGINES
 from hairkit.manager import Manager, PluginInfo
 from hairkit.manager.command_plugin import PluginCommand, read_command
 from hairkit.nets.model_folder import missing_models
@@ -38,8 +41,10 @@ from hairkit.options import split_setting, unknown_name
 from hairkit.pipeline.module_digest import module_digest
 from hairkit.pipeline.plugin_lock import check_lock, read_lock
 from hairkit.remote import is_url, read_bytes
-from hairkit.stages import OF_TABLE, RENAMED, Stage
+from hairkit.stages import EXPORT, OF_TABLE, RENAMED, Stage
 
+_ENGINES = "for"
+"""Key of the table `export` with the engines for which files are written, too."""
 _Result = TypeVar("_Result")
 _log = logging.getLogger("hairkit")
 
@@ -50,6 +55,8 @@ class Choice:
 
     plugin: str
     options: Mapping[str, object]
+    file: str = ""
+    """Where an export goes in the results' folder; empty for `groom` with the plugin's ending."""
 
 
 @dataclass(frozen=True)
@@ -183,7 +190,7 @@ class Recipe:
             raise OptionError(f"--set {text}: recipe {self.name} uses {reason}")
         return self._map(
             lambda choice: (
-                Choice(plugin, MappingProxyType({**choice.options, name: value}))
+                replace(choice, options=MappingProxyType({**choice.options, name: value}))
                 if choice.plugin == plugin
                 else choice
             )
@@ -355,15 +362,29 @@ def _stage(table: str, content: object, source: str) -> Selection:
         raise InputError(f"{source}: {table}.plugin is {named!r}, expected a plugin's name")
     if len(set(names)) != len(names):
         raise InputError(f"{source}: {table}.plugin names a plugin twice")
+    engines = _engine_choices(content.get(_ENGINES, []), source) if table == EXPORT.table else ()
     if not names or (len(names) > 1 and not OF_TABLE[table].several):
         raise InputError(f"{source}: {table}.plugin names {len(names)} plugins, expected one")
-    options = {key: value for key, value in content.items() if key != "plugin"}
+    options = {key: v for key, v in content.items() if key not in ("plugin", _ENGINES)}
     choices = tuple(_choice(name, options, len(names) == 1) for name in names)
     if options:
         key = next(iter(options))
         reason = f"options of several plugins stand in [{table}.PLUGIN]; PLUGIN is one of"
         raise InputError(f"{source}: {table}.{key}: {reason}: {', '.join(names)}")
-    return Selection(table, choices)
+    return Selection(table, choices + engines)
+
+
+def _engine_choices(engines: Any, source: str) -> tuple[Choice, ...]:
+    """Return the exports of one or several engines, each engine's into a folder of its name."""
+    names = [str(name) for name in (engines if isinstance(engines, list) else [engines])]
+    wrong = next((name for name in names if name not in ENGINES), None)
+    if wrong is not None:
+        raise InputError(f"{source}: export.{_ENGINES}: {unknown_name('engine', wrong, ENGINES)}")
+    return tuple(
+        Choice(file.plugin, MappingProxyType(dict(file.options)), f"{engine}/{file.name}")
+        for engine in dict.fromkeys(names)
+        for file in ENGINES[engine]
+    )
 
 
 def _choice(name: str, options: dict[str, Any], alone: bool) -> Choice:

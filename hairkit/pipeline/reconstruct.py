@@ -19,7 +19,7 @@ from hairkit.parallel import one_blas_thread, thread_count
 from hairkit.pipeline.figure import RED, Figure
 from hairkit.pipeline.findings import Findings
 from hairkit.pipeline.health import assess
-from hairkit.pipeline.recipe import Recipe, missing_networks
+from hairkit.pipeline.recipe import Choice, Recipe, missing_networks
 from hairkit.pipeline.run_log import RunLog
 from hairkit.pipeline.run_record import RECORD, RunRecord, describe_run, finish_record
 from hairkit.pipeline.stage_runner import StageRunner
@@ -28,6 +28,7 @@ from hairkit.pipeline.work_folder import WORK, WorkFolder, drop_work
 from hairkit.progress import Progress, Silent
 from hairkit.stages import EXPORT, ROWS
 from hairkit.stages import SHEET as SHEET_STAGE
+from hairkit.system import utf8_name
 from hairkit.types.capture import Capture
 from hairkit.types.evidence import Evidence
 from hairkit.types.groom import Groom
@@ -97,6 +98,7 @@ def reconstruct(
     OSError
         A file cannot be written. Files are written whole or not at all.
     """
+    utf8_name(Path(out).absolute())
     manager = manager or Manager.loaded()
     if not 1 <= guides <= MAX_GUIDES:
         raise InputError(f"{guides} guides, expected 1 to {MAX_GUIDES}")
@@ -182,14 +184,12 @@ class _Made:
 
 def export_paths(
     out: str | os.PathLike[str], recipe: Recipe, manager: Manager
-) -> tuple[tuple[str, Path], ...]:
+) -> tuple[tuple[Choice, Path], ...]:
     """Return plugin and path of every file that the recipe exports into a folder."""
     selection = recipe.stage(EXPORT.table)
-    names = [choice.plugin for choice in selection.choices] if selection is not None else []
-    suffixes = [(manager.info(name).suffixes or (f".{name}",))[0] for name in names]
-    return tuple(
-        (name, Path(out) / f"groom{suffix}") for name, suffix in zip(names, suffixes, strict=True)
-    )
+    choices = selection.choices if selection is not None else ()
+    usual = {c.plugin: (manager.info(c.plugin).suffixes or (f".{c.plugin}",))[0] for c in choices}
+    return tuple((c, Path(out) / (c.file or f"groom{usual[c.plugin]}")) for c in choices)
 
 
 def _make(findings: Findings) -> _Made:
@@ -209,7 +209,7 @@ def _thinned(map_: OrientationMap) -> OrientationMap:
 
 
 def _write(
-    folder: Path, run: StageRunner, made: _Made, exports: Sequence[tuple[str, Path]]
+    folder: Path, run: StageRunner, made: _Made, exports: Sequence[tuple[Choice, Path]]
 ) -> None:
     """Write the groom, the scene and the exports."""
     made.groom.save(folder / "groom.npz")
@@ -221,8 +221,9 @@ def _write(
         for camera, view in zip(scene.cameras, views, strict=True)
     )
     replace(scene, cameras=cameras).write_json(folder / "scene.json", photos)
-    for plugin, path in exports:
-        run.export(plugin, made.groom, path)
+    for choice, path in exports:
+        path.parent.mkdir(exist_ok=True)
+        run.export(choice, made.groom, path)
 
 
 def _draw_sheet(path: Path, made: _Made, log: RunLog) -> None:

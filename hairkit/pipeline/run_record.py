@@ -24,6 +24,7 @@ from hairkit.pipeline.run_log import StageTime
 from hairkit.remote import is_url, join, read_bytes
 from hairkit.stages import OF_TABLE
 from hairkit.storage import read_text, write_text
+from hairkit.system import utf8_name
 from hairkit.types.capture import Capture
 from hairkit.types.parting import Parting, PartingWord
 from hairkit.version import __version__
@@ -59,6 +60,8 @@ class PluginRecord:
     code: str
     """Digest of the plugin's source and of what it imports, see `module_digest`."""
     options: Mapping[str, Any]
+    file: str = ""
+    """Where it exports to, if not to its usual file."""
 
 
 @dataclass(frozen=True)
@@ -103,7 +106,7 @@ class RunRecord:
         stages = []
         for table in OF_TABLE:
             own = [p for p in self.plugins if new_table(p.stage, RECORD) == table]
-            choices = tuple(Choice(p.plugin, MappingProxyType(dict(p.options))) for p in own)
+            choices = tuple(Choice(p.plugin, MappingProxyType({**p.options}), p.file) for p in own)
             if choices:
                 stages.append(Selection(table, choices))
         if not stages or stages[0].table != "capture":  # a record from before that stage
@@ -138,10 +141,17 @@ def describe_run(
         What runs.
     guides, seed
         Of the roots.
+
+    Raises
+    ------
+    InputError
+        The name of an input is not UTF-8, so that no record can hold it.
     """
     head_file = head if isinstance(head, HeadFile) else None
     plugins = _plugins(recipe, manager)
     files = [*input_files(capture), *(head_file.files() if head_file else ()), *_named(plugins)]
+    for file in files:
+        utf8_name(file)  # names are written into records, which are UTF-8
     return RunRecord(
         hairkit=__version__,
         platform=platform.platform(),
@@ -185,12 +195,17 @@ def finish_record(
     stages: Sequence[StageTime],
     health: Sequence[Figure],
 ) -> RunRecord:
-    """Return the record with what the run gave; outputs are named without their folder."""
+    """Return the record with what the run gave; outputs are named in the folder of the first."""
+    folder = outputs[0].parent
     return dataclasses.replace(
         record,
         stages=tuple(stages),
         health=tuple(health),
-        outputs=tuple(hash_file(path, path.name) for path in outputs if path.is_file()),
+        outputs=tuple(
+            hash_file(path, path.relative_to(folder).as_posix())
+            for path in outputs
+            if path.is_file()
+        ),
     )
 
 
@@ -260,7 +275,9 @@ def _plugins(recipe: Recipe, manager: Manager) -> tuple[PluginRecord, ...]:
             file = Path(info.distribution)
             origin = str(file.resolve()) if file.is_file() else info.distribution
             records.append(
-                PluginRecord(stage.table, choice.plugin, origin, info.version, code, values)
+                PluginRecord(
+                    stage.table, choice.plugin, origin, info.version, code, values, choice.file
+                )
             )
     return tuple(records)
 

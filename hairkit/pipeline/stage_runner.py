@@ -19,7 +19,7 @@ import scipy
 from hairkit.manager import Manager
 from hairkit.memory import give_back_memory
 from hairkit.pipeline.module_digest import module_digest
-from hairkit.pipeline.recipe import Recipe, stage_digest
+from hairkit.pipeline.recipe import Choice, Recipe, stage_digest
 from hairkit.pipeline.run_log import RunLog
 from hairkit.pipeline.work_folder import WorkFolder, digest_of
 from hairkit.stages import EXPORT, Stage
@@ -137,15 +137,12 @@ class StageRunner:
         """Start what nothing waits for yet on another thread."""
         return self._pool.submit(work, *args)
 
-    def export(self, plugin: str, groom: Groom, path: Path) -> None:
+    def export(self, choice: Choice, groom: Groom, path: Path) -> None:
         """Write one of the recipe's files."""
-        selection = self.recipe.stage(EXPORT.table)
-        choices = () if selection is None else selection.choices
-        options = next(choice.options for choice in choices if choice.plugin == plugin)
-        started = time.perf_counter()
-        self.log.started(plugin, 1)
-        self.manager.call(EXPORT.hook, plugin, options, groom=groom, path=path)
-        self.log.finished(plugin, time.perf_counter() - started, False)
+        started, shown = time.perf_counter(), choice.file or choice.plugin
+        self.log.started(shown, 1)
+        self.manager.call(EXPORT.hook, choice.plugin, choice.options, groom=groom, path=path)
+        self.log.finished(shown, time.perf_counter() - started, False)
 
 
 class _Steps:

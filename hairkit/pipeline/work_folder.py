@@ -28,6 +28,7 @@ import numpy as np
 from hairkit.errors import HairkitError, InputError
 from hairkit.stages import FITTED, LABELS, REFINED, SCENE, Stage
 from hairkit.storage import Stored, from_arrays, read_npz, to_arrays, write_npz
+from hairkit.system import lock_file
 from hairkit.types.mask import Mask
 from hairkit.types.scene import Scene
 
@@ -260,24 +261,15 @@ def _stored_digest(path: Path) -> str | None:
         return None
 
 
-def _lock(path: Path, waiting: Callable[[], None]) -> int | None:
+def _lock(path: Path, waiting: Callable[[], None]) -> int:
     """Wait for the lock and return its open file; the system releases it when the process ends."""
-    try:
-        import fcntl
-    except ImportError:  # no file locks on this system; files are still written atomically
-        return None
     handle = os.open(path, os.O_RDWR | os.O_CREAT, _ALL_READ_AND_WRITE)
-    reported = False
     try:
-        while True:
-            try:
-                fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                return handle
-            except BlockingIOError:
-                if not reported:
-                    waiting()
-                reported = True
+        if not lock_file(handle, path.parent):
+            waiting()
+            while not lock_file(handle, path.parent):
                 time.sleep(_LOCK_POLL_S)
     except BaseException:
         os.close(handle)
         raise
+    return handle

@@ -14,8 +14,9 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.errors import RenderError
+from hairkit.errors import RenderError, one_line
 from hairkit.rendering.osmesa import OSMesaContext
+from hairkit.system import gl_backends, gl_cure
 
 REQUIRED_VERSION = 430
 """OpenGL 4.3, for compute shaders and storage buffers."""
@@ -26,12 +27,8 @@ _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swr")
 
 Compiled = TypeVar("Compiled")
 
-BACKENDS = ("egl", "osmesa")
+BACKENDS = gl_backends()
 """Tried in this order; `HAIRKIT_GL` picks one."""
-
-_CURE = (
-    "install a software renderer with: apt-get install libegl1 libgl1 libgl1-mesa-dri libosmesa6"
-)
 
 
 class Renderer:
@@ -164,7 +161,7 @@ def shader_source(name: str) -> str:
     `#include "other.glsl"` stands for that source, `#constants hairkit.rendering.fibre TILT` for
     constants of a Python module, where their values have units and reasons.
     """
-    text = resources.files("hairkit_shaders").joinpath(name).read_text()
+    text = resources.files("hairkit_shaders").joinpath(name).read_text(encoding="utf-8")
     return "\n".join(map(_expand, text.splitlines()))
 
 
@@ -210,14 +207,16 @@ def _create() -> Renderer:
         try:
             context = _open(backend)
         except Exception as error:  # drivers fail in many ways; try the next backend
-            failures.append(f"{backend}: {' '.join(str(error).split())}")
+            failures.append(f"{backend}: {one_line(error)}")
         else:
             _owner = os.getpid()
             return Renderer(context, backend)
-    raise RenderError(f"no OpenGL 4.3 context ({'; '.join(failures)}); {_CURE}")
+    raise RenderError(f"no OpenGL 4.3 context ({'; '.join(failures)}); {gl_cure()}")
 
 
 def _open(backend: str) -> moderngl.Context:
     # moderngl's stubs type its free keyword settings as one dict
-    settings: Any = {"backend": "egl"} if backend == "egl" else {"context": OSMesaContext()}
+    settings: Any = {"backend": backend} if backend == "egl" else {}
+    if backend == "osmesa":
+        settings["context"] = OSMesaContext()
     return moderngl.create_context(REQUIRED_VERSION, standalone=True, **settings)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, field
 from time import perf_counter
 
@@ -15,6 +14,7 @@ from hairkit.parallel import one_blas_thread
 from hairkit.progress import Progress, Silent
 from hairkit.simulation.motion import HeadMotion
 from hairkit.simulation.simulator import Simulator, Surroundings
+from hairkit.system import physical_bytes
 from hairkit.types.point_cache import PointCache
 
 LONGEST = 0.01
@@ -102,21 +102,13 @@ def run(
 
 def _allocate_frames(frames: int, points: int) -> Float32Array:
     """Allocate all frames; raises `InputError` if they do not fit into memory."""
-    size, memory = frames * points * 12, _physical_memory()
+    size, memory = frames * points * 12, physical_bytes()
     if size > memory:
         raise InputError(
             f"{frames} frames of {points} points take {size / 2**30:.0f} GiB of memory, expected at"
             f" most {memory / 2**30:.0f}; record fewer frames"
         )
     return np.empty((frames, points, 3), np.float32)
-
-
-def _physical_memory() -> float:
-    """Return the memory of this machine in bytes, infinity if unknown."""
-    try:
-        return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
-    except (AttributeError, ValueError, OSError):
-        return float("inf")
 
 
 def _check_points(points: Float32Array, shape: tuple[int, ...], time: float) -> None:

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hairkit.errors import InputError, MissingExtraError
+from hairkit.system import keep_port, lock_file
 
 try:
     import uvicorn
@@ -147,7 +148,7 @@ def _socket(settings: Settings) -> socket.socket:
     ports = [settings.port] if settings.port is not None else [PORT, 0]
     for port in ports:
         listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        keep_port(listening)
         try:
             listening.bind((host, port))
             listening.listen()  # who opens the link at once waits until the server is there
@@ -160,17 +161,10 @@ def _socket(settings: Settings) -> socket.socket:
 @contextlib.contextmanager
 def _locked(folder: Path) -> Iterator[None]:
     """Hold the project for one server; the system lets it go when the process ends."""
-    try:
-        import fcntl
-    except ImportError:  # no file locks on this system
-        yield
-        return
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder}: not a folder; name one for the project")
     (folder / ".studio").mkdir(parents=True, exist_ok=True)
-    with (folder / ".studio" / "lock").open("w") as file:
-        try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
-            raise InputError(f"{folder}: another studio has this project open") from error
+    with (folder / ".studio" / "lock").open("wb") as file:
+        if not lock_file(file.fileno(), folder):
+            raise InputError(f"{folder}: another studio has this project open")
         yield

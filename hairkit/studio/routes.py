@@ -16,7 +16,7 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, JSONResponse, Response, StreamingResponse
 from starlette.routing import Route
 
-from hairkit.errors import HairkitError
+from hairkit.errors import HairkitError, one_line
 from hairkit.io.capture_toml import HeadEntry
 from hairkit.options import make_options, option
 from hairkit.storage import read_bytes
@@ -56,6 +56,8 @@ class Routes:
         """`link` returns a new link for a further browser."""
         self._studio = studio
         self._sessions = sessions
+        self._writing = asyncio.Lock()
+        """Held while a file is written: who asks for it meanwhile gets the same one."""
         self._link = link
 
     def all(self) -> list[Route]:
@@ -93,7 +95,7 @@ class Routes:
             ("/api/result/draft", "GET", partial(self._made, name=self._studio.project.draft.name)),
             ("/api/result/sheet", "GET", partial(self._made, name="contact_sheet.png")),
             ("/api/result/page", "GET", self._page),
-            ("/api/result/{plugin:str}", "GET", self._file),
+            ("/api/result/{format:str}", "GET", self._file),
         ]
         return [Route(path, _clear(handler), methods=[method]) for path, method, handler in table]
 
@@ -102,7 +104,8 @@ class Routes:
         secret = self._sessions.open(token) if isinstance(token, str) else None
         if secret is None:
             raise HTTPException(
-                HTTPStatus.FORBIDDEN, "this link was used before; the terminal shows a new one"
+                HTTPStatus.FORBIDDEN,
+                "this link was used before, or is not whole; open the last one in the terminal",
             )
         response = JSONResponse({})
         secure = request.url.scheme == "https"
@@ -164,7 +167,7 @@ class Routes:
         studio = self._studio
         incoming = await receive_file(request, studio.project.incoming, "video")
         video = incoming.with_suffix(".mp4")
-        incoming.rename(video)
+        incoming.replace(video)
         try:
             folder, name = str(studio.project.incoming), video.stem
             found = await studio.editor.call(
@@ -318,22 +321,24 @@ class Routes:
 
     async def _file(self, request: Request) -> Response:
         """Write the groom in a format, unless the build has, and send it."""
-        studio, plugin = self._studio, request.path_params["plugin"]
-        suffix = dict(studio.formats).get(plugin)
+        studio, format_ = self._studio, request.path_params["format"]
+        suffix = dict(studio.formats).get(format_)
         if suffix is None or not studio.project.groom.is_file():
             raise HTTPException(HTTPStatus.NOT_FOUND, _UNKNOWN)
         path = studio.project.result / f"groom{suffix}"
-        groom = studio.project.groom
-        if not path.is_file() or path.stat().st_mtime_ns < groom.stat().st_mtime_ns:
-            with tempfile.TemporaryDirectory(dir=studio.project.incoming) as folder:
-                made = Path(folder) / path.name
-                await studio.builder.call(
-                    "export",
-                    EXPORT_S + BUILD_S,
-                    {"groom": str(groom), "plugin": plugin, "path": str(made)},
-                )
-                made.replace(path)
+        async with self._writing:
+            await self._make_file(format_, path)
         return FileResponse(path, media_type="application/octet-stream", filename=path.name)
+
+    async def _make_file(self, format_: str, path: Path) -> None:
+        groom = self._studio.project.groom
+        if path.is_file() and path.stat().st_mtime_ns >= groom.stat().st_mtime_ns:
+            return
+        with tempfile.TemporaryDirectory(dir=self._studio.project.incoming) as folder:
+            made = Path(folder) / path.name
+            values = {"groom": str(groom), "format": format_, "path": str(made)}
+            await self._studio.builder.call("export", EXPORT_S + BUILD_S, values)
+            made.replace(path)
 
     async def _made(self, request: Request, name: str) -> Response:
         path = self._studio.project.result / name
@@ -357,9 +362,7 @@ def _clear(handler: Handler) -> Handler:
         except HTTPException as error:
             return JSONResponse({"error": error.detail}, error.status_code, error.headers)
         except HairkitError as error:
-            return JSONResponse(
-                {"error": " ".join(str(error).split())}, HTTPStatus.UNPROCESSABLE_ENTITY
-            )
+            return JSONResponse({"error": one_line(error)}, HTTPStatus.UNPROCESSABLE_ENTITY)
 
     return answer
 

@@ -10,7 +10,7 @@ from functools import partial
 from typing import Any
 
 from hairkit import worker
-from hairkit.errors import HairkitError
+from hairkit.errors import HairkitError, one_line
 from hairkit.parallel import one_blas_thread
 
 
@@ -27,7 +27,16 @@ def _do(task: Callable[..., Any], request: dict[str, Any], tell: Callable[[Any],
     try:
         return {"made": task(request, tell)}
     except HairkitError as error:
-        return {"refused": " ".join(str(error).split())}
+        return {"refused": _without_paths(one_line(error), request)}
+
+
+def _without_paths(line: str, request: dict[str, Any]) -> str:
+    """Return a line in which the server's files have the words of the pages."""
+    folder = {"": f"{request['folder']}/"} if request.get("folder") else {}
+    files = {"the photo": request.get("incoming") or request.get("photo")}
+    for words, path in {**files, "the video": request.get("video"), **folder}.items():
+        line = line.replace(path, words) if path else line
+    return line
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ their own (`task_child`), so that a picture that crashes a decoder ends one task
 
 from __future__ import annotations
 
+import zipfile
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
@@ -14,9 +15,11 @@ from typing import Any
 import cv2
 import numpy as np
 
+from hairkit.api import export_for
 from hairkit.arrays import Float32Array, Float64Array, Int32Array, UInt8Array
 from hairkit.errors import HairkitError
 from hairkit.grooming.densify import roots_between
+from hairkit.grooming.engine_files import ENGINES
 from hairkit.head_model.scalp import roots_at
 from hairkit.imaging.picture_file import encode_picture, write_picture
 from hairkit.io.capture_toml import head_entry, head_pose, read_capture_file
@@ -54,6 +57,8 @@ DRAFT_SETTINGS = ("visual_hull.voxel_size=0.006",)
 """Options of a quick groom: cells of 6 mm, not 3.5. With 5 mm, or with whole photos instead of
 those of `OUTLINE_EDGE`, F 4/40 of the sample's preview (59) changes by a point, and it takes
 longer."""
+_FOR = "for-"
+"""Before the name of an engine among the formats."""
 VIDEO_EDGE = 1440
 """Long edge in pixels of a video's frames."""
 
@@ -142,18 +147,24 @@ def draft_groom(request: dict[str, Any], tell: Tell) -> Any:
 
 
 def export_groom(request: dict[str, Any], tell: Tell) -> Any:
-    """Write the `groom` by the `plugin` to `path`."""
-    groom = Groom.load(request["groom"])
-    plugin, path = request["plugin"], Path(request["path"])
-    manager().call("export_groom", plugin, manager().options(plugin, {}), groom=groom, path=path)
+    """Write the `groom` to `path` in a `format` of `list_formats`: a file, or an engine's."""
+    groom, path = Groom.load(request["groom"]), Path(request["path"])
+    plugin, _, engine = request["format"].partition(_FOR)
+    if not engine:
+        manager().call("export_groom", plugin, groom=groom, path=path)
+        return {}
+    with zipfile.ZipFile(path, "w") as archive:
+        for file in export_for(groom, engine, path.with_suffix(""), manager=manager()):
+            info = zipfile.ZipInfo(f"{engine}/{file.name}")  # without the time
+            archive.writestr(info, read_bytes(file), zipfile.ZIP_DEFLATED, compresslevel=1)
     return {}
 
 
 def list_formats(request: dict[str, Any], tell: Tell) -> Any:
-    """Return plugin and file suffix of every format that a groom can be written in."""
-    plugins = manager()
-    found = [(name, plugins.info(name).suffixes) for name in plugins.names("export_groom")]
-    return {"formats": [[name, suffixes[0]] for name, suffixes in found if suffixes]}
+    """Return name and file suffix of all that a groom can be written as, engines first."""
+    found = [(name, manager().info(name).format) for name in manager().names("export_groom")]
+    plugins = [[name, format_.suffixes[0]] for name, format_ in found if format_ and format_.there]
+    return {"formats": [*([_FOR + engine, f"-{engine}.zip"] for engine in ENGINES), *plugins]}
 
 
 def draw_guides(request: dict[str, Any], tell: Tell) -> Any:

@@ -14,7 +14,8 @@ import numpy as np
 from alembic3d import Abc, AbcCoreAbstract, AbcGeom
 
 from hairkit.errors import InputError
-from hairkit.storage import replace_file, utf8_name
+from hairkit.storage import replace_file
+from hairkit.system import utf8_name
 from hairkit.version import __version__
 
 from .curves import GroomCurves

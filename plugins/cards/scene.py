@@ -81,7 +81,7 @@ class Scenes:
         name = f"cards_LOD{number}"
         parts = [(name, self._mesh(name, level, skeleton))]
         if head:
-            parts.append(("head", self._head(skeleton)))
+            parts.append(("head_mesh", self._head(skeleton)))
         shown = [document.add("nodes", name=n, mesh=mesh, skin=skin) for n, mesh in parts]
         document.add("scenes", name=f"LOD{number}", nodes=[nodes[0], *shown])
         document.json["scene"] = 0
@@ -172,4 +172,4 @@ class Scenes:
             "indices": self.document.indices(head.faces, len(head.vertices)),
             "material": self.document.add("materials", name="skin", pbrMetallicRoughness=look),
         }
-        return self.document.add("meshes", name="head", primitives=[primitive])
+        return self.document.add("meshes", name="head_mesh", primitives=[primitive])

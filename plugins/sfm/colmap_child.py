@@ -87,7 +87,9 @@ def _match(pycolmap: Any, database: Path, neighbours: int) -> None:
         for step in range(1, neighbours + 1)
     }
     listed = database.with_name("pairs.txt")
-    listed.write_text("\n".join(f"{first} {second}" for first, second in sorted(pairs)))
+    listed.write_text(
+        "\n".join(f"{first} {second}" for first, second in sorted(pairs)), encoding="utf-8"
+    )
     pairing = pycolmap.ImportedPairingOptions()
     pairing.match_list_path = str(listed)
     pycolmap.match_image_pairs(

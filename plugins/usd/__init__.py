@@ -42,6 +42,7 @@ FORMAT = FileFormat(
     exact=frozenset(Feature) - _WRITTEN - {Feature.ANIMATION},
     partial={Feature.ANIMATION: "written; the rest pose is read"},
     written=_WRITTEN,
+    needs="pxr",
 )
 
 

@@ -14,7 +14,8 @@ import numpy.typing as npt
 
 from hairkit.child_process import ChildError, Limits, ask_once
 from hairkit.errors import FormatError, InputError, MissingExtraError
-from hairkit.storage import open_file, read_npz, utf8_name
+from hairkit.storage import open_file, read_npz
+from hairkit.system import utf8_name
 
 from .stage import MISSING
 

@@ -10,7 +10,8 @@ from hairkit.errors import InputError, MissingExtraError
 from hairkit.grooming.prepare_export import PreparedGroom
 from hairkit.io.coordinate_space import FileSpace
 from hairkit.io.textures import picture_names, write_pictures
-from hairkit.storage import replace_file, utf8_name
+from hairkit.storage import replace_file
+from hairkit.system import utf8_name
 
 from .options import Options
 

@@ -14,6 +14,7 @@ carved with opened masks, `loose` with the masks as they are. Cells that are emp
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -36,6 +37,7 @@ from hairkit.options import option
 from .carving import EMPTY, HAIR, PERSON, LabelledView, Rule, carve
 from .torso_fit import fit_torso
 
+_log = logging.getLogger("hairkit.visual_hull")
 POOR_CAMERAS = 8.0
 """Misfit in pixels of a picture 1080 high above which one empty vote is forgiven."""
 LYING = 0.04
@@ -44,6 +46,9 @@ BELOW_HEAD = np.array([0.3, 0.5, 0.3])
 """Metres beside, below and behind the head's mesh in which hair is looked for: it may be long."""
 ABOVE_HEAD = np.array([0.3, 0.3, 0.3])
 """Metres beside, above and before the head's mesh in which hair is looked for."""
+MOST_HAIR = 0.05
+"""Cubic metres of hair up to which cells have the size that is set: five times the hull of tight
+curls (9 litres). Masks that call whole photos hair would be fifty times the work."""
 COARSE_CELLS = 4
 """Edge, in cells, of those by which the box of the hair is found."""
 SCALP_ROOM = 0.012
@@ -111,8 +116,7 @@ def build_hull(scene: Scene, masks: tuple[Mask, ...], options: Options) -> Hull:
     views = _Views.of(scene, masks, options)
     torso = _torso(scene, masks, options)
     dressed = views if torso is None else views.in_front_of(torso)
-    box = _bounding_box(scene, dressed, torso, options)
-    grid = VoxelGrid.around(box[0], box[1], options.voxel_size)
+    grid = _grid_around_hair(scene, dressed, torso, options)
     distance = signed_distance(scene.head, grid)
     outside, near = _room(grid, torso, options)
     if options.cut_head:
@@ -240,16 +244,24 @@ def _disc(radius: float) -> UInt8Array:
     return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size)), np.uint8)
 
 
-def _bounding_box(
+def _grid_around_hair(
     scene: Scene, views: _Views, torso: Torso | None, options: Options
-) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Return the corners of the box that holds the hair, found on coarse cells."""
+) -> VoxelGrid:
+    """Return the grid that holds the hair, found on coarse cells.
+
+    Its cells grow where there is more than `MOST_HAIR`.
+    """
     low = scene.head.vertices.min(axis=0).astype(np.float64) - BELOW_HEAD
     high = scene.head.vertices.max(axis=0).astype(np.float64) + ABOVE_HEAD
     coarse = VoxelGrid.around(low, high, COARSE_CELLS * options.voxel_size)
     outside, near = _room(coarse, torso, options)
     occupied = carve(coarse, outside, near, views.loose(), _rule(options, views.forgive))
     cells = np.argwhere(_largest_part(occupied))
+    share = len(cells) * coarse.spacing**3 / MOST_HAIR
+    spacing = options.voxel_size * max(1.0, share) ** (1 / 3)
+    if share > 1:
+        said = "masks hold %.0f litres of hair, so cells are %.1f mm wide, not %.1f; look at them"
+        _log.warning(said, *(1000 * v for v in (share * MOST_HAIR, spacing, options.voxel_size)))
     if not len(cells):
         raise InputError(
             "the hull is empty: the masks of the views do not overlap in space; "
@@ -259,9 +271,10 @@ def _bounding_box(
         coarse.origin + np.array([cells.min(axis=0) - 1, cells.max(axis=0) + 2]) * coarse.spacing
     )
     scalp = scene.head.vertices[scene.head.scalp > 0.5]
-    return (
+    return VoxelGrid.around(
         np.minimum(corners[0], scalp.min(axis=0) - SCALP_ROOM),
         np.maximum(corners[1], scalp.max(axis=0) + SCALP_ROOM),
+        spacing,
     )
 
 

@@ -16,9 +16,10 @@ import quick_captures
 from quick_captures import COMMAND, write_captures
 
 from hairkit.batches.jobs import Job, Result, Settings, find_jobs, finished, job_digest, part_of
-from hairkit.batches.pool import LocalPool, Watcher, free_bytes
+from hairkit.batches.pool import LocalPool, Watcher
 from hairkit.batches.run_job import JobLimits
 from hairkit.errors import InputError
+from hairkit.system import available_bytes
 
 GOOD = tuple(f"good-{number}" for number in range(6))
 GIB = 2**30
@@ -169,7 +170,7 @@ def test_memory_decides_how_many_run_at_once(tmp_path: Path) -> None:
             with guard:
                 running[0] -= 1
         assert (max(seen) <= 2) == (budget == GIB)  # one may start before the other is counted off
-    assert free_bytes() > 0
+    assert available_bytes() > 0
 
 
 def test_a_batch_that_is_left_ends_its_processes(tmp_path: Path) -> None:

@@ -46,6 +46,9 @@ def test_native_copies_are_equal(groom_file: Path) -> None:
         (["groom.npz", "-o", "b.npz", "--using", "gabor"], "implements 'export_groom'"),
         (["groom.npz", "-o", "b.npz", "--set", "native.x=1"], "no option 'x'"),
         (["groom.npz", "-o", "b.npz", "--set", "x"], "expected plugin.option=value"),
+        (["groom.npz", "--for", "unreal", "-o", "groom.npz"], "groom.npz: not a folder"),
+        (["groom.npz", "--for", "unreal", "-o", "b", "--using", "fbx"], "leave --using out"),
+        (["none.npz", "--for", "unreal", "-o", "b"], "no such file"),
     ],
 )
 def test_wrong_words_get_one_line(

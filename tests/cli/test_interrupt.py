@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -126,3 +127,22 @@ def test_the_first_ctrl_c_is_enough_for_a_plugin_that_listens(
     assert err.splitlines()[-1].startswith("hairkit: interrupted")
     assert "Traceback" not in err
     assert out == ""
+
+
+def test_ctrl_c_while_python_ends_keeps_the_exit_code(
+    files: dict[str, Path], tmp_path: Path
+) -> None:
+    """Further ones, pressed until the process is gone, do not end it by the signal."""
+    hook, argument, _, command = PLACES["an export"]
+    text = PLUGIN.replace("HOOK", hook).replace("ARGUMENTS", argument).replace("WAY", SLEEP)
+    files["plugin"].write_text(text)
+    process = start([*command.format(**files).split(), "--plugin", str(files["plugin"])])
+    wait_for(tmp_path, "hangs", SECONDS)
+    process.send_signal(signal.SIGINT)
+    assert process.stderr is not None
+    assert process.stderr.readline().startswith("hairkit: interrupted")
+    while process.poll() is None:
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.001)
+    process.communicate()
+    assert process.returncode in (2, 130)

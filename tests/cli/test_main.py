@@ -235,3 +235,31 @@ def test_version_is_the_packages(capsys: pytest.CaptureFixture[str]) -> None:
 def test_an_error_without_a_file_name_is_still_told() -> None:
     """An OSError made from a text alone keeps its text."""
     assert cli.explain(OSError("the disk is gone")) == ("the disk is gone", 2)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["head", "photos", "-o"],
+        ["render", "a.npz", "-o"],
+        ["simulate", "a.npz", "-o"],
+        ["export", "a.npz", "-o"],
+        ["convert", "a.npz"],
+        ["texture", "bump", "a.png", "-o"],
+    ],
+)
+@pytest.mark.parametrize("ending", ["x.glb", "x.npz", "x.png"])
+def test_a_missing_folder_for_the_result_is_told_before_any_work(
+    words: list[str],
+    ending: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """Verbs that write one file look for its folder first, or refuse its ending."""
+    bristle_groom().save(tmp_path / "a.npz")
+    monkeypatch.chdir(tmp_path)
+    assert cli.main([*words, f"none/{ending}"]) == 2
+    said = capsys.readouterr().err
+    assert "none: no such folder; make it first" in said or f"none/{ending}: " in said
+    assert "No such file" not in said

@@ -14,6 +14,7 @@ from hairkit import hookimpl
 from hairkit.cli import main
 from hairkit.cli.validate import BROKEN
 from hairkit.errors import PluginError
+from hairkit.grooming.engine_files import ENGINES
 from hairkit.grooming.target_rules import TARGETS, check_groom
 from hairkit.head_model.scalp import sample_roots
 from hairkit.head_model.template import default_head
@@ -31,6 +32,9 @@ WRITTEN = {
     "tressfx": ("hair.tfx", []),
     "web": ("hair.glb", ["--set", "strips=20"]),
     "usd": ("hair.usda", []),
+    "blender": ("hair.abc", []),
+    "maya": ("hair.abc", ["--set", "axis=y_up_centimetres"]),
+    "houdini": ("hair.abc", []),
 }
 """The file of each target, and how it is exported."""
 
@@ -70,6 +74,20 @@ def test_what_hairkit_writes_for_a_target_passes(
     path.parent.mkdir()
     assert main(["export", str(folder / "groom.npz"), "-o", str(path), *options]) == 0
     code, found = answers([str(path), "--for", target], capsys)
+    assert (code, set(found.values())) == (0, {"passed"}), found
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_an_export_for_an_engine_passes_its_rules(
+    engine: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its files lie in the folder, the hair passes every rule, and nothing else has to be said."""
+    out = folder / f"for-{engine}"
+    assert main(["export", str(folder / "groom.npz"), "--for", engine, "-o", f"{out}/"]) == 0
+    files = capsys.readouterr().out.split()
+    assert files == [str(out / file.name) for file in ENGINES[engine]]
+    assert sorted(files) == sorted(map(str, out.iterdir()))
+    code, found = answers([files[0], "--for", engine], capsys)
     assert (code, set(found.values())) == (0, {"passed"}), found
 
 

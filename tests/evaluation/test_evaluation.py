@@ -64,7 +64,7 @@ def test_the_frame_of_the_prediction_does_not_matter(truth_folder: Path, out_fol
 
 
 def test_views_are_paired_by_name(truth_folder: Path, out_folder: Path) -> None:
-    """A prediction whose views come in another order is put into the truth's."""
+    """A prediction whose views come in another order, or with others, is put into the truth's."""
     truth, first = read_truth(truth_folder), read_prediction(out_folder)
     assert first.orientations is not None
     assert first.masks is not None
@@ -79,6 +79,14 @@ def test_views_are_paired_by_name(truth_folder: Path, out_folder: Path) -> None:
     found = evaluate(turned, truth)
     assert found.azimuth_error_deg < 1e-6
     assert found.mask_iou == 1.0
+    above = replace(
+        first,
+        names=("top", *first.names),
+        cameras=(first.cameras[0], *first.cameras),
+        orientations=(first.orientations[0], *first.orientations),
+        masks=(first.masks[0], *first.masks),
+    )
+    assert evaluate(above, truth).mask_iou == 1.0
     renamed = replace(first, names=tuple("abcdefgh"))
     assert evaluate(renamed, truth).azimuth_error_deg < 1e-6
 
@@ -158,7 +166,7 @@ def test_a_groom_without_its_cameras_is_one_line(
 
 
 def test_another_captures_truth_is_one_line(truth_folder: Path, out_folder: Path) -> None:
-    """Seven predicted views cannot be compared with eight."""
+    """Seven predicted views cannot be compared with eight of other names."""
     first = read_prediction(out_folder)
     seven = replace(first, names=first.names[:7], cameras=first.cameras[:7])
     with pytest.raises(InputError, match="7 views, the truth 8"):

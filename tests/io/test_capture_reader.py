@@ -46,6 +46,25 @@ def test_names_of_views_come_before_file_order(tmp_path: Path) -> None:
     assert [int(view.image[0, 0, 0]) for view in capture.views] == list(range(8))
 
 
+def test_a_cameras_own_name_among_views_leaves_the_turn_to_the_photos(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Names may be any: where one tells nothing, none counts, and its mask stays its own."""
+    names = ["back", "front", "IMG_9", "left"]
+    for index, name in enumerate(names):
+        write_grey(tmp_path / f"{name}.png", np.full((20, 20), index, np.uint8))
+    (tmp_path / "masks").mkdir()
+    write_grey(tmp_path / "masks" / "front.png", np.zeros((20, 20), np.uint8))
+    views = read_capture(tmp_path).views
+    assert not any(view.named for view in views)
+    assert [view.photo_path.stem for view in views if view.photo_path] == names
+    assert [view.mask_path is not None for view in views] == [False, True, False, False]
+    assert "IMG_9.png: its name tells no view" in caplog.text
+    (tmp_path / "IMG_9.png").rename(tmp_path / "rihgt.png")
+    with pytest.raises(InputError, match="did you mean 'right'"):
+        read_capture(tmp_path)
+
+
 def test_what_lies_beside_the_photos_is_found_by_name(tmp_path: Path) -> None:
     """Masks, strokes and landmarks go to the view whose photo has their name."""
     folder = write_capture(tmp_path / "c", masks=True)

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from hairkit_plugins import cards as plugin
 
+import hairkit
 from hairkit.cli import main
 from hairkit.errors import FormatError
 from hairkit.io.card_file import read_card_file
+from hairkit.io.glb_file import GlbFile
 from hairkit.testing import bristle_groom
 
 
@@ -65,3 +67,30 @@ def test_other_files_hold_no_cards(tmp_path: Path) -> None:
     )
     with pytest.raises(FormatError, match="not a readable glTF file"):
         read_card_file(tmp_path / "b.gltf")
+
+
+@pytest.mark.parametrize("name", ["a.cards.glb", "a.vrm", "a.glb"])
+def test_nodes_and_meshes_have_names_of_their_own(name: str, tmp_path: Path) -> None:
+    """Loaders that go by names find one joint `head`, whatever levels of detail there are."""
+    if name == "a.glb":
+        hairkit.export(bristle_groom(), tmp_path / name, lods=3)
+    else:
+        written(tmp_path / name, bones=3)
+    document = GlbFile(tmp_path / name).document
+    for kind in ("nodes", "meshes"):
+        names = [item["name"] for item in document[kind]]
+        assert len(set(names)) == len(names)
+    assert "head" in [node["name"] for node in document["nodes"]]
+
+
+def test_an_avatar_of_others_is_told_as_a_head(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A .vrm without our cards has no strands, but a body that can be measured, scalp or not."""
+    hairkit.export(bristle_groom(), tmp_path / "a.glb", lines="none")
+    (tmp_path / "a.glb").rename(tmp_path / "a.vrm")
+    assert main(["info", str(tmp_path / "a.vrm")]) == 0
+    assert "kind: head" in capsys.readouterr().out
+    (tmp_path / "b.obj").write_text("v 0 0 0\nv 0.1 0 0\nv 0 0.1 0.1\nf 1 2 3\n")
+    assert main(["info", str(tmp_path / "b.obj"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["scalp_vertices"] == 0

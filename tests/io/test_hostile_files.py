@@ -37,8 +37,7 @@ SECONDS = 20
 """A reader that takes longer waits for something that never comes."""
 OWN_FILES = {
     "hairkit/storage.py": "opens every file",
-    "hairkit/child_process.py": "what the system says of a process",
-    "hairkit/batches/pool.py": "what the system says of memory",
+    "hairkit/system.py": "what the system says of memory",
     "hairkit/kernel_cache.py": "sources of kernels",
     "hairkit/worker.py": "runs without the rest of hairkit; its own files",
     "hairkit/head_model/template_skin.py": "its own picture",

@@ -256,6 +256,16 @@ def test_a_flat_photo_is_whole(tmp_path: Path, value: int, settings: list[int]) 
     assert (read_photo(tmp_path / "a.jpg")[0] == flat).all()
 
 
+def test_a_good_photo_is_read_in_silence(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Areas of mid-grey within a black-and-white photo make no decoder complain."""
+    picture = np.repeat(scene_picture()[..., :1], 3, axis=2)
+    large = cv2.resize(picture, (400, 300))
+    large[100:200, 100:200] = 128
+    cv2.imwrite(str(tmp_path / "a.jpg"), large)
+    read_photo(tmp_path / "a.jpg")
+    assert capfd.readouterr().err == ""
+
+
 @pytest.mark.parametrize("rows", [0, 20, 39])
 def test_a_png_that_lost_rows_is_refused(tmp_path: Path, rows: int) -> None:
     """A PNG with whole chunks but too few rows is named."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -10,6 +11,7 @@ import numpy.typing as npt
 import pytest
 
 from hairkit.errors import InputError
+from hairkit.io import video
 from hairkit.io.capture_reader import read_capture
 from hairkit.io.video import FRAMES, choose_frames, is_video, read_video
 
@@ -35,9 +37,9 @@ def turns() -> npt.NDArray[np.float64]:
     return np.cumsum(speed) / speed.sum()
 
 
-def write(path: Path, pictures: list[npt.NDArray[np.uint8]]) -> Path:
+def write(path: Path, pictures: list[npt.NDArray[np.uint8]], codec: str = "mp4v") -> Path:
     """Write a video, every third frame of it blurred as by a shaking hand."""
-    code = cv2.VideoWriter.fourcc(*"mp4v")
+    code = cv2.VideoWriter.fourcc(*codec)
     file = cv2.VideoWriter(str(path), code, 30.0, (WIDTH, HEIGHT))
     if not file.isOpened():
         pytest.skip("this OpenCV writes no videos")
@@ -69,6 +71,46 @@ def test_frames_are_even_steps_of_the_turn_and_sharp(turn: Path) -> None:
     assert first.photo_size == (WIDTH, HEIGHT)
     gap = np.abs(first.image.astype(float) - head(turns()[numbers[0]])).mean()
     assert gap < 12  # the codec's
+
+
+def patched(path: Path, element: bytes, make: Callable[[bytes], bytes]) -> None:
+    """Replace one element of a Matroska file, whose size is a single byte, by another as long."""
+    data = path.read_bytes()
+    begin = data.index(element)
+    size_at = begin + len(element)
+    end = size_at + 1 + (data[size_at] & 0x7F)
+    path.write_bytes(data[:begin] + make(data[begin:end]) + data[end:])
+
+
+@pytest.mark.parametrize("ending", [".mkv", ".webm"])
+def test_frames_of_a_varying_rate_are_all_there(ending: str, tmp_path: Path) -> None:
+    """A file without a count of frames is whole where they last as long as it claims."""
+    path = write(tmp_path / f"turn{ending}", [head(share) for share in turns()], "VP80")
+    duration = b"\x23\xe3\x83"  # of one frame, in nanoseconds: half as long, so twice as many
+    patched(path, duration, lambda old: old[:4] + (int.from_bytes(old[4:]) // 2).to_bytes(4))
+    claimed = cv2.VideoCapture(str(path)).get(cv2.CAP_PROP_FRAME_COUNT)
+    assert claimed > 1.9 * FRAME_COUNT
+    assert len(read_capture(path).views) == FRAMES
+
+
+def test_a_file_that_ends_early_is_refused(tmp_path: Path) -> None:
+    """Half the frames of a Matroska file are not taken for the whole turn."""
+    path = write(tmp_path / "turn.mkv", [head(share) for share in turns()], "VP80")
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    with pytest.raises(InputError, match=r"only \d\.\d of 4\.\d s can be read"):
+        read_video(path, 256)
+
+
+def test_recordings_without_a_duration_are_looked_at_to_their_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What a browser records claims no length; frames are then left out as it goes on."""
+    monkeypatch.setattr(video, "MOST_SCANNED", 20)
+    path = write(tmp_path / "turn.webm", [head(share) for share in turns()], "VP80")
+    patched(path, b"\x44\x89\x88", lambda old: b"\xec" + bytes([0x80 | len(old) - 2]) + old[2:])
+    capture = read_capture(path)
+    numbers = [int(str(view.photo_path).rpartition("#")[2]) for view in capture.views]
+    assert numbers[-1] > 0.9 * FRAME_COUNT
 
 
 def test_frames_are_scaled_to_the_working_size(turn: Path) -> None:

@@ -63,7 +63,7 @@ DESCRIBING = {
 """What a command does before its first answer -> what is said."""
 CALLING = {
     "raises": "RuntimeError: CUDA out of memory",
-    "raises_a_novel": r"RuntimeError: \[31mword word",
+    "raises_a_novel": r"RuntimeError: \\x1b\[31mword word",
     "exits": "SystemExit: 4",
     "exits_hard": "ended with exit code 5",
     "crashes": r"crashed \(SIGSEGV\)",

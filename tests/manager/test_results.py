@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -324,3 +325,22 @@ def test_an_old_file_is_not_taken_for_a_new_one(tmp_path: Path) -> None:
     for data in (b"hair of this week", b"hair of last week"):
         os.utime(path, (1e9, 1e9))
         manager_answering("export_groom", writing(data)).call("export_groom", "odd", **arguments)
+
+
+@pytest.mark.parametrize("error", [ValueError("no"), InputError("no"), KeyboardInterrupt()])
+def test_a_failed_export_leaves_no_half_file(error: BaseException, tmp_path: Path) -> None:
+    """What it wrote goes; an old file that it did not touch stays."""
+    arguments = stage_arguments("export_groom", tmp_path)
+    path: Path = arguments["path"]
+
+    def fail(asked: Any, *, written: bool) -> bool:
+        if written:
+            path.write_bytes(b"half")
+        raise error
+
+    path.write_bytes(b"hair of last week")
+    for written, left in ((False, True), (True, False)):
+        manager = manager_answering("export_groom", partial(fail, written=written))
+        with pytest.raises((PluginError, InputError, KeyboardInterrupt)):
+            manager.call("export_groom", "odd", **arguments)
+        assert path.exists() == left

@@ -111,6 +111,8 @@ def test_several_plugins_have_tables_of_their_own() -> None:
         (NEEDED + '[orient]\nplugin = ["a", "b"]', "names 2 plugins, expected one"),
         (NEEDED + "[orient]\nplugin = []", "names 0 plugins"),
         (NEEDED + '[export]\nplugin = ["a", "a"]\n[orient]\nplugin="a"', "names a plugin twice"),
+        ('[export]\nfor = ["unrael"]', "no engine 'unrael' .did you mean 'unreal'"),
+        ("[export]\nfor = 3", "export.for: no engine '3'; valid: unreal, unity"),
     ],
 )
 def test_a_wrong_recipe_is_one_line_with_file_and_key(text: str, said: str) -> None:

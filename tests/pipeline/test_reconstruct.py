@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -326,6 +327,23 @@ class Listener:
         self.heard.append(("groom", groom))
 
 
+@pytest.mark.parametrize("at_fault", ["out", "photo"])
+def test_names_that_are_not_utf8_are_refused_before_any_work(at_fault: str, tmp_path: Path) -> None:
+    """No stage runs and nothing is written, whether a photo or the results have such a name."""
+    bad = os.fsdecode(b"IMG\xff.jpg")
+    (tmp_path / bad).write_bytes(b"")
+    capture = turn_capture()
+    if at_fault == "photo":
+        first = replace(capture.views[0], photo_path=tmp_path / bad)
+        capture = replace(capture, views=(first, *capture.views[1:]))
+    out = tmp_path / "out" / (bad if at_fault == "out" else "x")
+    ball_plugin.CALLS.clear()
+    with pytest.raises(InputError, match="not UTF-8"):
+        run(out, capture=capture)
+    assert ball_plugin.CALLS == []
+    assert not out.parent.exists()
+
+
 def test_listeners_hear_every_stage_once(tmp_path: Path) -> None:
     """Each stage is told once, with its result, those of single views as a tuple."""
     listener = Listener()
@@ -342,5 +360,6 @@ def test_an_exporter_without_suffix_gets_its_name() -> None:
     manager = Manager()
     manager.register(ball_plugin, "ball_plugin")
     recipe = parse_recipe(RECIPE.encode(), "ball", "test")
-    assert export_paths("out", recipe, manager) == (("ball_plugin", Path("out/groom.ball")),)
+    [(choice, path)] = export_paths("out", recipe, manager)
+    assert (choice.plugin, path) == ("ball_plugin", Path("out/groom.ball"))
     assert export_paths("out", recipe.with_set(["export=none"]), manager) == ()

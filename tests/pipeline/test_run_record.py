@@ -25,10 +25,10 @@ from hairkit.testing import ball_head, turn_capture
 PARTING = ["--parting", "left"]
 
 
-def run_in(folder: Path) -> Path:
+def run_in(folder: Path, recipe: str = RECIPE) -> Path:
     """The results of the small capture, with masks, strokes, a head's file and an option."""
     capture = write_capture(folder / "capture", masks=True)
-    (folder / "ball.toml").write_text(RECIPE)
+    (folder / "ball.toml").write_text(recipe)
     write_head_obj(folder / "head.obj", ball_head())
     words = ["reconstruct", str(capture), "-o", str(folder / "out"), "--guides", "20"]
     words += ["--recipe", str(folder / "ball.toml"), "--plugin", str(PLUGIN_FILE), "--quiet"]
@@ -105,6 +105,16 @@ def test_the_scene_names_the_photo_of_every_view(out: Path) -> None:
     photos = sorted(path.name for path in (out.parent / "capture" / "photos").iterdir())
     assert [view["photo"] for view in views] == photos
     assert all(view["photo"].endswith(f"_{view['name']}.png") for view in views)
+
+
+def test_files_of_engines_are_recorded_and_made_again(tmp_path: Path) -> None:
+    """A recipe's engines have folders of their own; the record names each file in them."""
+    made = run_in(tmp_path, RECIPE.replace("[export]", '[export]\nfor = ["maya", "hairworks"]'))
+    files = {file.path for file in read_record(made / RECORD).outputs}
+    assert files > {"maya/hair.abc", "maya/guides.ma", "maya/head.fbx", "hairworks/hair.apx"}
+    assert all((made / file).is_file() for file in files)
+    again = rerun(made / RECORD, tmp_path / "again")
+    assert (set(again.same), again.different) == (files, ())
 
 
 def test_other_versions_are_told(out: Path, tmp_path: Path) -> None:

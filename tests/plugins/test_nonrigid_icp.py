@@ -15,6 +15,8 @@ from hairkit import Head
 from hairkit.arrays import Float64Array
 from hairkit.errors import FormatError, InputError
 from hairkit.head_model.signed_distance import distance_to
+from hairkit.head_model.template import default_head
+from hairkit.io.head_reader import write_head_obj
 from hairkit.testing import ball_head, turn_capture, turn_scene
 
 HEAD = ball_head()
@@ -121,6 +123,16 @@ def test_files_are_read_in_their_unit(tmp_path: Path) -> None:
     np.testing.assert_allclose(scan.points, points, atol=1e-6)
     assert scan.landmarks is not None
     np.testing.assert_allclose(scan.landmarks, points[:68], atol=1e-6)
+
+
+def test_landmarks_of_a_written_head_are_read(tmp_path: Path) -> None:
+    """What `hairkit head -o x.obj` writes beside the mesh, numbers of vertices, marks a scan."""
+    head = default_head()
+    write_head_obj(tmp_path / "x.obj", head)
+    scan = read_scan(tmp_path / "x.obj")
+    assert scan.landmarks is not None
+    assert head.landmark_vertices is not None
+    np.testing.assert_allclose(scan.landmarks, head.vertices[head.landmark_vertices], atol=1e-6)
 
 
 def test_bad_scans_are_refused(tmp_path: Path) -> None:

@@ -187,3 +187,24 @@ def test_what_a_crash_left_half_done_goes(tmp_path: Path) -> None:
     Project(project.folder)
     assert [path.exists() for path in kept] == [True] * len(kept)
     assert not any(path.exists() for path in left)
+
+
+def test_a_new_link_opens_a_page_that_stayed_open(
+    browser: Any, start_studio: Callable[..., Any], tmp_path: Path
+) -> None:
+    """After the server was started again its link works in the same tab, which loads anew."""
+    first = start_studio(tmp_path / "head")
+    page = browser.new_context().new_page()
+    page.goto(first.link)
+    page.wait_for_function("() => !location.hash.includes('t=')")
+    first.kill()
+    second = start_studio(tmp_path / "head", "--port", str(first.port))
+    try:
+        page.evaluate("link => { location.href = link; }", second.link)
+        page.wait_for_function("() => location.hash === '#photos'")
+        page.get_by_text("Photos").first.wait_for()
+        asked = "fetch('/api/project').then((answer) => answer.status)"
+        assert page.evaluate(asked) == 200
+    finally:
+        page.context.close()
+        second.kill()

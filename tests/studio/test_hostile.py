@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import socket
 import struct
@@ -282,3 +283,21 @@ def test_a_thousand_requests_at_once(server: Server) -> None:
     assert memory(server) < MOST_MEMORY
     assert not Project(server.folder).shots
     assert not list((server.folder / ".studio" / "incoming").iterdir())
+
+
+def test_what_is_refused_names_no_file_of_the_server(server: Server, tmp_path: Path) -> None:
+    """A picture bomb is `the photo`; a wrong link says what to open."""
+    size = struct.pack(">IIBBBBB", 20_000, 20_000, 8, 2, 0, 0, 0)
+    chunks = [(b"IHDR", size), (b"IEND", b"")]
+    data = b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
+        for name, body in chunks
+    )
+    answer = server.ask("POST", "/api/photos", data)
+    assert answer.status == 422
+    said = json.loads(answer.body)["error"]
+    assert said.startswith("the photo: 20000 x 20000 pixels")
+    assert str(tmp_path) not in said
+    answer = server.ask("POST", "/api/session", {"token": "x" * 22})
+    assert answer.status == 403
+    assert "open the last one in the terminal" in json.loads(answer.body)["error"]

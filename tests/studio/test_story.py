@@ -11,6 +11,7 @@ import shutil
 import subprocess
 import sys
 import time
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from studio_browser import GUIDES, OPTION, SLOW_S, USED, opened
 from studio_keys import go, step, tab_to
 
 from hairkit.cli import main
+from hairkit.grooming.engine_files import ENGINES
 from hairkit.io.capture_reader import read_capture
 
 MEASURE_MOTION = """() => {
@@ -40,7 +42,7 @@ MEASURE_MOTION = """() => {
   m.wind = [0, 0, 0]; step(600); return [still, blown, long, away()];
 }"""
 """Metres that hair moves at rest and in wind, its stretch there, and metres after a calm."""
-WRITTEN_ONLY, LEAST_FILE = (".html", ".fbx", ".ma", ".cards.glb"), 10_000
+WRITTEN_ONLY, LEAST_FILE = (".html", ".fbx", ".ma", ".cards.glb", ".zip"), 10_000
 """Files that hairkit does not read, and bytes of the smallest file."""
 
 
@@ -110,6 +112,8 @@ def test_a_stroke_moves_the_outline(page: Any, story: Any) -> None:
     page.keyboard.press("Control+z")
     page.get_by_text("Found automatically").wait_for()
     assert not (story.folder / "strokes" / "001.json").exists()
+    page.reload()
+    page.get_by_text("Found automatically").wait_for()
     page.keyboard.press("Control+Shift+z")
     page.get_by_text("1 stroke", exact=True).wait_for()
     assert kept_strokes(story, 1) == [shape]
@@ -247,13 +251,15 @@ def test_every_format_is_downloaded(page: Any, story: Any, tmp_path: Path) -> No
     page.locator("a[download='groom.npz']").wait_for()
     offered = page.locator("a[download]").all()
     names = [link.get_attribute("download") for link in offered]
-    assert {"groom.apx", "groom.npz", "result.html"} < set(names)
+    assert {"groom.apx", "groom.npz", "groom-unreal.zip", "result.html"} < set(names)
     for link, name in zip(offered, names, strict=True):
         path = tmp_path / name
         download(page, link, path)
         assert path.stat().st_size > LEAST_FILE
         if not name.endswith(WRITTEN_ONLY):
             assert main(["info", str(path)]) == 0, name
+    with zipfile.ZipFile(tmp_path / "groom-maya.zip") as archive:
+        assert archive.namelist() == [f"maya/{file.name}" for file in ENGINES["maya"]]
     made = (story.folder / "result" / "groom.apx").read_bytes()
     assert (tmp_path / "groom.apx").read_bytes() == made
 

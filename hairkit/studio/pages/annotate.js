@@ -119,6 +119,7 @@ class MaskPage {
       const [document, facts] = await Promise.all([kept, outlineOf(photo)]);
       if (strokes !== this.strokes) return;
       strokes.shapes = document.shapes ?? [];
+      strokes.recall(photo.id);
       stage.facts = facts;
       this.tell();
     } catch (error) { say(error.message); }
@@ -185,6 +186,7 @@ class MaskPage {
 
   // One request of a photo at a time; what is drawn meanwhile goes with the next.
   async save() {
+    this.strokes.keep(this.photo.id);
     const { photo, strokes, stage: { facts } } = this;
     this.tell();
     strokes.unsaved = true;

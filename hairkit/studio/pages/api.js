@@ -20,6 +20,13 @@ export async function send(method, path, body) {
   }));
 }
 
+// Ask for a file that a link loads at the same time; the error says why there is none.
+export async function prepare(path) {
+  const response = await fetch(path);
+  if (!response.ok) await answer(response);
+  await response.body.cancel();
+}
+
 async function answer(response) {
   if (response.ok) return response.json();
   const text = await response.text();

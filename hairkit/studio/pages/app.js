@@ -39,8 +39,15 @@ function showBuild(state) {
   bar.value = share ?? 0;
 }
 
+// A new link of a studio that was started again, opened in the same tab, changes the hash alone.
+function follow() {
+  if (new URLSearchParams(location.hash.slice(1)).has("t")) location.reload();
+  else show();
+}
+
 async function start() {
   onChange(showBuild);
+  addEventListener("hashchange", follow);
   try {
     await openSession();
     await refresh();
@@ -53,7 +60,6 @@ async function start() {
     return;
   }
   listen();
-  addEventListener("hashchange", show);
   show();
 }
 

@@ -1,12 +1,14 @@
 // The hair that turns and moves, and its files.
-import { make, onChange, refill, refresh, say, send, state } from "./api.js";
+import { make, onChange, prepare, refill, refresh, say, send, state } from "./api.js";
 import { showHair } from "./hair_controls.js";
 
 const LEAST_PHOTOS = 3;
-const ENGINES = {
-  hairworks: "HairWorks", alembic: "Blender, Unreal, Maya", gltf: "Web, Unity",
-  usd: "Houdini, Omniverse", fbx: "Unity, Maya", maya: "Maya, XGen", native: "hairkit",
-  obj: "any tool", ply: "any tool", tressfx: "TressFX", cyhair: "CyHair", usc_data: "research",
+const USES = {
+  "for-unreal": "Unreal Engine", "for-unity": "Unity", "for-blender": "Blender",
+  "for-maya": "Maya, XGen", "for-houdini": "Houdini", "for-hairworks": "HairWorks",
+  "for-web": "Web, three.js", hairworks: "guides", alembic: "guides", gltf: "ribbons, head",
+  usd: "Omniverse", fbx: "head", maya: "curves", native: "hairkit", obj: "any tool",
+  ply: "any tool", tressfx: "TressFX", cyhair: "CyHair", usc_data: "research",
   cards: "Hair cards",
 };
 const DRAFT = "This is a quick preview of your last change: the cameras are those of the hair "
@@ -88,15 +90,19 @@ class Side {
 function offers() {
   const health = (state.build.health ?? []).map(([light, line]) =>
     make("li", { class: light }, line.replace(`${light} `, "").trim()));
-  const known = ([plugin]) => (ENGINES[plugin] ? 1 : 0);
+  const known = ([format]) => (USES[format] ? 1 : 0);
   const formats = [...state.formats].sort((a, b) => known(b) - known(a));
+  const [engines, others] = [true, false].map((zip) =>
+    formats.filter(([, suffix]) => suffix.endsWith(".zip") === zip));
   return [
     state.draft ? make("p", { class: "note-box", role: "status" }, DRAFT) : null,
     make("h2", {}, "Take it with you"),
     make("a", { class: "button primary", href: "/api/result/page", download: "result.html" },
       "Save result.html"),
     make("p", { class: "quiet" }, "One file that moves in any browser and needs no server."),
-    make("div", { class: "tools" }, ...formats.map(download)),
+    make("div", { class: "tools" }, ...engines.map(download)),
+    make("p", { class: "quiet" }, "Single files of the guides, with each format's defaults:"),
+    make("div", { class: "tools" }, ...others.map(download)),
     make("a", { href: "/api/result/sheet", target: "_blank" }, "Overview of all steps"),
     health.length ? make("h2", {}, "How good it is") : null,
     make("ul", { class: "lights" }, ...health),
@@ -104,8 +110,11 @@ function offers() {
   ];
 }
 
-function download([plugin, suffix]) {
-  return make("a",
-    { href: `/api/result/${plugin}`, download: `groom${suffix}`, class: "button file" },
-    make("strong", {}, suffix), make("small", {}, ENGINES[plugin] ?? plugin));
+function download([format, suffix]) {
+  const link = make("a",
+    { href: `/api/result/${format}`, download: `groom${suffix}`, class: "button file" },
+    make("strong", {}, suffix.replace("-", "")), make("small", {}, USES[format] ?? format));
+  // A browser does not say why a download failed.
+  link.addEventListener("click", () => prepare(link.href).catch((error) => say(error.message)));
+  return link;
 }

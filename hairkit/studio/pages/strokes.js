@@ -72,6 +72,15 @@ export class Strokes {
     return true;
   }
 
+  // What was taken back is kept in the tab, so that a reload of the page does not lose it.
+  keep(photo) {
+    sessionStorage.setItem(`undone-${photo}`, JSON.stringify(this.undone));
+  }
+
+  recall(photo) {
+    this.undone = JSON.parse(sessionStorage.getItem(`undone-${photo}`) ?? "[]");
+  }
+
   draw(context, scale, height) {
     for (const shape of this.shapes) drawShape(context, shape, scale, height);
     if (this.current) drawShape(context, this.current, scale, height, true);

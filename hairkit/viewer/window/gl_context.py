@@ -5,13 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from hairkit.errors import RenderError
+from hairkit.system import gl_cure
 from hairkit.viewer.window.panel import load_windowing
 from hairkit.viewer.window.splash import TITLE
 
-_CURE = (
-    "install an OpenGL driver and a display (apt-get install libgl1 libgl1-mesa-dri; xvfb-run"
-    " without a screen), or use --headless"
-)
+_CURE = f"{gl_cure()}; without a screen run it under xvfb-run, or use --headless"
 
 
 class WindowContext:

@@ -16,7 +16,7 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from hairkit.errors import HairkitError, RenderError
+from hairkit.errors import HairkitError, RenderError, one_line
 from hairkit.rendering.context import REQUIRED_VERSION, install, renderer
 from hairkit.rendering.gl_camera import set_uniforms
 from hairkit.viewer.actions.actions import bindings, perform
@@ -159,7 +159,7 @@ class Window:
             with renderer():
                 perform(self.session, name, values)
         except (HairkitError, OSError) as error:
-            self.session.message = " ".join(str(error).split())
+            self.session.message = one_line(error)
         if name == "panel" and self.session.shown.panel:
             self.session.message = self._panel.missing
 
@@ -232,7 +232,7 @@ class Window:
             try:
                 self.preview.frame(seconds, still=filmed or bool(self.session.screenshots))
             except (HairkitError, OSError) as error:  # for example a full disk
-                self.session.message = " ".join(str(error).split())
+                self.session.message = one_line(error)
                 self.session.paused, self.session.recorder = True, None
                 self.session.screenshots = []
             self._present(gl)
@@ -251,7 +251,7 @@ class Window:
         except StopIteration:
             return None
         except (HairkitError, OSError) as error:
-            session.message = " ".join(str(error).split())
+            session.message = one_line(error)
             return None
         return steps
 
@@ -312,7 +312,7 @@ class Window:
                 with renderer():
                     self.session.poll_rerun()
             except (HairkitError, OSError) as error:
-                self.session.message = " ".join(str(error).split())
+                self.session.message = one_line(error)
             if self.session.rerun is None:  # its result is loaded already
                 self._watch_groom = FileWatcher([self.session.opened.path])
         elif self._watched != self.session.opened.path:
@@ -329,7 +329,7 @@ class Window:
                     self._blit = gl.context.vertex_array(program, [])
                     self.preview.draw()
             except RenderError as error:  # for example a half-edited shader: retry at the next save
-                self.session.message = " ".join(str(error).split())
+                self.session.message = one_line(error)
 
     def _listen(self) -> None:
         glfw, window = self._glfw, self._window
@@ -396,4 +396,4 @@ class _Warnings(logging.Handler):
 
     def emit(self, record: logging.LogRecord) -> None:
         """Show the warning until the next action."""
-        self._session.message = " ".join(record.getMessage().split())
+        self._session.message = one_line(record.getMessage())

@@ -9,7 +9,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hairkit_plugins.visual_hull import Options, build_hull
+from hairkit_plugins.visual_hull import MOST_HAIR, Options, build_hull
 from scipy import ndimage
 
 from hairkit.arrays import BoolArray, Float64Array
@@ -337,6 +337,19 @@ def test_the_finest_cells_allowed_fit_long_hair() -> None:
     VoxelGrid.around([-0.225, -0.55, -0.225], [0.225, 0.1, 0.225], finest)
     with pytest.raises(OptionError, match=r"'0\.001', expected a number from 0\.0015"):
         make_options(Options, {"voxel_size": "0.001"}, "visual_hull")
+
+
+def test_masks_that_call_everything_hair_bound_the_work(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """Whole photos of hair are carved in larger cells, and a warning says so."""
+    scene, masks = views_of(cap)
+    assert build_hull(scene, masks, Options()).grid.spacing == Options().voxel_size
+    assert caplog.text == ""
+    everything = tuple(Mask(np.full_like(mask.labels, 255), True) for mask in masks)
+    hull = build_hull(scene, everything, Options())
+    assert np.count_nonzero(hull.loose) * Options().voxel_size ** 3 < 1.3 * MOST_HAIR
+    assert "litres of hair" in caplog.text
 
 
 def test_masks_that_do_not_overlap_in_space_are_an_error() -> None:
