@@ -84,10 +84,10 @@ def _facts(path: Path, args: argparse.Namespace) -> dict[str, Any]:
             return _groom(path, args)
     except FormatError:  # no strands in it, so it is a head
         pass
-    from hairkit.io.head_reader import read_bare_head, read_head
+    from hairkit.io.head_reader import TRANSFER, read_bare_head, read_head
 
     bare = read_bare_head(path, args.head_units, args.head_scalp)
-    if bare.scalp is None:
+    if bare.scalp is None and args.head_scalp != TRANSFER:
         facts = {"vertices": len(bare.vertices), "faces": len(bare.faces), "scalp_vertices": 0}
         return {"kind": "head", **facts, "bounds_m": _bounds(bare.vertices.astype(np.float32))}
     return {"kind": "head", **_head(read_head(path, args.head_units, args.head_scalp))}
