@@ -2,13 +2,15 @@
 
 python benchmarks/turn.py captures/ --photos-alone
 python benchmarks/turn.py --seconds turn/     # hairkit synth straight --views 36 -o turn
+python benchmarks/turn.py captures/ --cameras # what cameras put right
 python benchmarks/turn.py captures/ --scores  # F of whole runs
 
 Faces and persons are those of the capture (landmarks.json, masks/) unless `--photos-alone` asks the
 networks (`hairkit models install`). Names of files are ignored. A turn counts as found when no
-photo is more than 30 degrees off; the true turn is in truth/. `--seconds` prints instead what
-whole runs on 3 to 36 of the photos of one turn take, `--scores` how well whole runs on the photos
-alone score in each order.
+photo is more than 30 degrees off; the true turn is in truth/. `--cameras` judges turns by their
+cameras, as a run does: those of all photos, and of all but one, on photos alone. `--seconds` prints
+instead what whole runs on 3 to 36 of the photos of one turn take, `--scores` how well whole runs on
+the photos alone score in each order.
 """
 
 from __future__ import annotations
@@ -27,13 +29,15 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 from captures_argument import NO_CAPTURES, add_captures
-from hairkit_plugins import face_mesh, landmark_files, mask_files, photo_turn, selfie
+from hairkit_plugins import auto_matte, face_mesh, landmark_files, mask_files, photo_turn, selfie
 
 from hairkit import Capture, View
 from hairkit.errors import InputError
 from hairkit.evaluation import evaluate, read_prediction, read_truth
+from hairkit.head_model.template import default_head
 from hairkit.io.capture_reader import read_capture
 from hairkit.options import make_options
+from hairkit.pipeline.judge_turn import judge_turn
 from hairkit.pipeline.reconstruct import reconstruct
 from hairkit.types.face import Face
 from hairkit.types.person import Person
@@ -41,6 +45,8 @@ from hairkit.types.turnaround import Turnaround
 
 FOUND_DEG = 30.0
 """Error of the worst photo up to which a turn is found."""
+SURE = 1.25
+"""Margin from which health is green."""
 SHUFFLES = 8
 """Random orders tried of each capture."""
 COUNTS = (3, 8, 12, 24, 36)
@@ -75,6 +81,7 @@ def main() -> None:
     add_captures(parser)
     parser.add_argument("--photos-alone", action="store_true", help="faces and persons by networks")
     parser.add_argument("--seconds", type=Path, metavar="FOLDER", help="capture of runs to time")
+    parser.add_argument("--cameras", action="store_true", help="turns that cameras put right")
     parser.add_argument("--scores", action="store_true", help="F of whole runs in each order")
     parser.add_argument("--guides", type=int, default=GUIDES, help="strands of a scored run")
     arguments = parser.parse_args()
@@ -83,6 +90,9 @@ def main() -> None:
         return
     if arguments.captures is None:
         print(NO_CAPTURES)
+        return
+    if arguments.cameras:
+        print_judged(arguments.captures)
         return
     if arguments.scores:
         print_scores(arguments.captures, arguments.guides)
@@ -93,6 +103,35 @@ def main() -> None:
     print("|---|---|---|---|---|---|---|---|")
     for folder in sorted(path.parent for path in arguments.captures.glob("*/truth")):
         print(_row(folder.name, _photos(folder, arguments.photos_alone)))
+
+
+def print_judged(captures: Path) -> None:
+    """Print how many turns, whole and with a photo left out, are in order, and with cameras.
+
+    "Silent" ones are wrong after all, with a margin of 1.25 and more. Seconds are the processor's.
+    """
+    matte = make_options(auto_matte.Options, {}, "auto_matte")
+    print("| capture | turns | in order | with cameras | silent | margin | with cameras | s each |")
+    print("|---|---|---|---|---|---|---|---|")
+    for folder in sorted(path.parent for path in captures.glob("*/truth")):
+        photos, cells, spent = _photos(folder, True), [], 0.0
+        for out in range(-1, len(photos)):
+            chosen = [photo for k, photo in enumerate(photos) if k != out]
+            _, turn = _errors(chosen)
+            if turn is None:
+                continue
+            seen = tuple(photo.view.with_findings(photo.face, photo.person) for photo in chosen)
+            began = _processor_seconds()
+            masks = tuple(auto_matte.segment(view, matte) for view in seen) if turn.others else ()
+            judged = judge_turn(Capture(seen), masks, default_head(), turn)
+            spent += _processor_seconds() - began
+            before, after = (_in_order(each, chosen) for each in (turn, judged))
+            silent = not after and judged.margin >= SURE
+            cells.append((before, after, silent, turn.margin, judged.margin))
+        found, right, silent, first, then = zip(*cells, strict=True)
+        counts = f"{len(cells)} | {sum(found)} | {sum(right)} | {sum(silent)}"
+        margins = f"{first[0]:.2f} | {then[0]:.2f}"
+        print(f"| {folder.name} | {counts} | {margins} | {spent / len(cells):.1f} |", flush=True)
 
 
 def print_seconds(folder: Path) -> None:
@@ -185,9 +224,10 @@ def _processor_seconds() -> float:
 def _photos(folder: Path, photos_alone: bool) -> list[Photo]:
     """Return the photos of a capture with all that `find_turn` is given."""
     capture, truth = read_capture(folder), read_truth(folder / "truth")
-    azimuths = dict(zip(truth.names, (c.azimuth_deg for c in truth.cameras), strict=True))
+    true = [camera.azimuth_deg for camera in truth.cameras]
+    named = dict(zip(truth.names, true, strict=True))
     photos = []
-    for view in capture.views:
+    for view, azimuth in zip(capture.views, true, strict=True):  # unnamed photos: by their files
         if photos_alone:
             mesh = make_options(face_mesh.Options, {}, "face_mesh")
             face = face_mesh.detect_landmarks(view, mesh)
@@ -201,7 +241,7 @@ def _photos(folder: Path, photos_alone: bool) -> list[Photo]:
                 replace(view, named=False, landmarks=None),
                 face or Face.absent(),
                 person or Person.absent(),
-                azimuths[view.name],
+                named[view.name] if view.named else azimuth,
             )
         )
     return photos
@@ -245,6 +285,13 @@ def _errors(photos: list[Photo]) -> tuple[npt.NDArray[np.float64], Turnaround | 
         return np.full(len(photos), 180.0), None
     true = np.array([photo.azimuth_deg for photo in photos])
     return np.abs((turn.azimuth_deg - true + 180) % 360 - 180), turn
+
+
+def _in_order(turn: Turnaround, photos: list[Photo]) -> bool:
+    """Return whether level photos have the order in which they lie around the head."""
+    true = np.array([photo.azimuth_deg for photo in photos])[turn.order]
+    steps = np.diff(true, append=true[0]) % 360
+    return not turn.above.any() and bool(np.isclose(steps.sum(), 360))
 
 
 def _lying(photo: Photo) -> Photo:
