@@ -14,13 +14,12 @@ import cv2
 import numpy as np
 
 from hairkit import studio
-from hairkit.arrays import UInt8Array
+from hairkit.arrays import Float64Array, UInt8Array
 from hairkit.head_model.template import default_head
-from hairkit.io.capture_reader import TURN
 from hairkit.io.photos import focal_from_equivalent
 from hairkit.rendering import Solid, draw_views
 from hairkit.storage import write_bytes
-from hairkit.studio.capture_guides import DISTANCE, LENS_MM, LOOK_AT, guides_for
+from hairkit.studio.capture_guides import DISTANCE, LENS_MM, LOOK_AT, guide_at
 from hairkit.studio.feedback import Feedback
 from hairkit.synth.bust import Bust
 from hairkit.synth.growth import grow
@@ -57,6 +56,8 @@ class Example:
     image: UInt8Array
     """(H, W, 3) RGB."""
     person: Person
+    landmarks: Float64Array
+    """(68, 2) pixels."""
 
 
 def draw_examples() -> Iterator[Example]:
@@ -74,8 +75,10 @@ def draw_examples() -> Iterator[Example]:
         Feedback.WRONG_ANGLE: _camera(turn=TURNED_DEG),
     }
     pictures = _draw(groom, cloth, list(cameras.values()))
-    for name, (picture, person) in zip(cameras, pictures, strict=True):
-        yield Example(str(name), picture, person)
+    corners = groom.head.vertices[groom.head.landmark_vertices].astype(np.float64)
+    faces = [camera.project(corners) for camera in cameras.values()]
+    for name, (picture, person), face in zip(cameras, pictures, faces, strict=True):
+        yield Example(str(name), picture, person, face)
     good, person = pictures[0]
     light = {
         Feedback.TOO_DARK: good * DIM,
@@ -83,7 +86,7 @@ def draw_examples() -> Iterator[Example]:
         Feedback.BLURRED: cv2.GaussianBlur(good, (0, 0), BLUR),
     }
     for code, levels in light.items():
-        yield Example(code.value, np.clip(levels, 0, 255).astype(np.uint8), person)
+        yield Example(code.value, np.clip(levels, 0, 255).astype(np.uint8), person, faces[0])
 
 
 def _draw(groom: Groom, cloth: Solid, cameras: list[Camera]) -> list[tuple[UInt8Array, Person]]:
@@ -115,15 +118,14 @@ def _camera(
 
 def write_examples(folder: Path) -> None:
     """Write `example-NAME.jpg` for each picture, with the outline that the head should fill."""
-    front = guides_for(len(TURN), above=False)[0]
-    outline = max(front["outline"], key=len)
-    points = np.array(outline).reshape(-1, 2) * (WIDTH, HEIGHT) * 2**SHIFT
+    front = guide_at(0.0, 0.0)
+    points = max(front.silhouette, key=len) * (WIDTH, HEIGHT) * 2**SHIFT
     for example in draw_examples():
         picture = example.image.copy()
         curve = [np.rint(points).astype(np.int32)]
         cv2.polylines(picture, curve, False, (255, 255, 255), 1, cv2.LINE_AA, SHIFT)
         if example.name in (GOOD, Feedback.ABOVE_LINE):
-            row = round(front["top"] * HEIGHT)
+            row = round(front.line * HEIGHT)
             picture[row : row + 2, np.arange(WIDTH) // DASH % 2 == 0] = LINE
         data = cv2.imencode(".jpg", picture[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1]
         write_bytes(folder / f"example-{example.name}.jpg", data.tobytes())

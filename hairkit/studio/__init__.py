@@ -8,6 +8,7 @@ processes of its own, and all state is in the project's folder.
 * `clean_photo`: photos without what their files tell of a person
 * `events`: what changed, sent to pages
 * `feedback`: what is said about a photo, one list for all
+* `framing`: whether the head is where the page draws it
 * `guard`: who may ask for what
 * `hair_packet`: a groom as the page reads it
 * `lan`: addresses, certificate and code for a phone

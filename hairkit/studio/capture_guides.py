@@ -13,10 +13,12 @@ from typing import Any
 import cv2
 import numpy as np
 
+from hairkit.arrays import Float64Array
 from hairkit.cameras.depth_raster import head_depth
 from hairkit.head_model.template import default_head
 from hairkit.io.capture_reader import TOP_DEG, TURN
 from hairkit.io.photos import focal_from_equivalent
+from hairkit.studio.framing import Guide
 from hairkit.types.camera import Camera
 
 WIDTH, HEIGHT = 360, 480
@@ -33,44 +35,46 @@ distance by which it is simplified, both in those pixels."""
 
 
 def guides_for(count: int, above: bool) -> list[dict[str, Any]]:
-    """Return name, azimuth, outline and line of the hair's top for each view of a turn.
+    """Return name, azimuth, elevation, outline and dashed line of each view of a turn, for pages.
 
-    `outline` are curves [[x, y, x, y, ...], ...], silhouette and face, and `top` a height, in
-    shares of width and height of a picture with sides 3 : 4.
+    `outline` are curves [[x, y, x, y, ...], ...], silhouette and face, and `top` the height of the
+    line, in shares of width and height of a picture with sides 3 : 4.
     """
     azimuths = [360.0 * index / count for index in range(count)]
-    names = {azimuth: name for name, azimuth in TURN.items()}
-    guides = [_guide(names.get(azimuth, f"{azimuth:.0f}°"), azimuth, 0.0) for azimuth in azimuths]
-    return [*guides, _guide("top", 0.0, TOP_DEG)] if above else guides
-
-
-def hair_line(azimuth_deg: float) -> float:
-    """Return the height of the line of a view of the turn that the hair should stay below."""
-    return float(_guide("", azimuth_deg, 0.0)["top"])
+    guides = [guide_at(azimuth, 0.0) for azimuth in azimuths]
+    return [_for_page(guide) for guide in (*guides, *([guide_at(0.0, TOP_DEG)] * above))]
 
 
 @cache
-def _guide(name: str, azimuth_deg: float, elevation_deg: float) -> dict[str, Any]:
-    camera = camera_at(azimuth_deg, elevation_deg)
-    head = default_head()
+def guide_at(azimuth_deg: float, elevation_deg: float) -> Guide:
+    """Return what is drawn over the picture of a view of the turn, or of one from above."""
+    camera, head = camera_at(azimuth_deg, elevation_deg), default_head()
     inside = np.isfinite(head_depth(head, camera.resized(FINER * WIDTH, FINER * HEIGHT)))
     soft = cv2.GaussianBlur(inside.astype(np.float32), (0, 0), SMOOTH)
     filled = (soft > 1 / 2).astype(np.uint8)
     curves, _ = cv2.findContours(filled, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     smooth = [cv2.approxPolyDP(curve, TOLERANCE, True)[:, 0] for curve in curves]
+    closed = [np.array([*curve, curve[0]]) for curve in smooth if len(curve) > 2]
     hair = (head.vertices + HAIR_ABOVE * head.normals())[head.scalp > 0].astype(np.float64)
+    assert head.landmark_vertices is not None
+    landmarks = camera.project(head.vertices[head.landmark_vertices].astype(np.float64))
+    return Guide(
+        "top" if elevation_deg else _NAMES.get(azimuth_deg, f"{azimuth_deg:.0f}°"),
+        azimuth_deg,
+        elevation_deg,
+        tuple(_shares((curve + 0.5) / FINER) for curve in closed),
+        tuple(_shares(landmarks[order]) for order in _seen_lines(camera)),
+        _shares(landmarks),
+        float(camera.project(hair)[:, 1].min() / HEIGHT),
+    )
+
+
+def _for_page(guide: Guide) -> dict[str, Any]:
+    curves = [*guide.silhouette, *guide.face]
     return {
-        "name": name,
-        "azimuth": azimuth_deg,
-        "elevation": elevation_deg,
-        "outline": [
-            _shares((np.array([*curve, curve[0]]) + 0.5) / FINER - 0.5)
-            for curve in smooth
-            if len(curve) > 2
-        ]
-        + _face(camera),
-        "top": float(camera.project(hair)[:, 1].min() / HEIGHT),
-    }
+        "name": guide.name, "azimuth": guide.azimuth, "elevation": guide.elevation,
+        "outline": [curve.round(4).ravel().tolist() for curve in curves], "top": guide.line,
+    }  # fmt: skip
 
 
 def camera_at(azimuth_deg: float, elevation_deg: float) -> Camera:
@@ -86,11 +90,11 @@ def camera_at(azimuth_deg: float, elevation_deg: float) -> Camera:
     )
 
 
-def _shares(points: Any) -> list[float]:
-    shares = (np.asarray(points, np.float64) + 0.5) / (WIDTH, HEIGHT)
-    return [round(float(value), 4) for value in shares.ravel()]
+def _shares(pixels: Float64Array) -> Float64Array:
+    return np.asarray(pixels / (WIDTH, HEIGHT), np.float64)
 
 
+_NAMES = {azimuth: name for name, azimuth in TURN.items()}
 _LINES = ((17, 22), (22, 27), (27, 31), (31, 36), (36, 42), (42, 48), (48, 60))
 """First and last landmark of brows, nose, eyes and mouth (iBUG)."""
 _CLOSED = (36, 42, 48)
@@ -98,17 +102,12 @@ _FACING = math.cos(math.radians(80))
 """Cosine of the angle between normal and view from which a line of the face is drawn."""
 
 
-def _face(camera: Camera) -> list[list[float]]:
-    """Return lines of brows, nose, eyes and mouth as far as the camera sees them."""
+def _seen_lines(camera: Camera) -> list[list[int]]:
+    """Return the landmarks of each line of brows, nose, eyes and mouth that the camera sees."""
     head = default_head()
     assert head.landmark_vertices is not None
     points = head.vertices[head.landmark_vertices].astype(np.float64)
     towards = -camera.view_direction(points)
     seen = (head.normals()[head.landmark_vertices] * towards).sum(axis=1) > _FACING
-    pixels = camera.project(points)
-    lines = []
-    for first, last in _LINES:
-        order = list(range(first, last)) + ([first] if first in _CLOSED else [])
-        if seen[order].all():
-            lines.append(_shares(pixels[order]))
-    return lines
+    orders = [[*range(*line), *([line[0]] if line[0] in _CLOSED else [])] for line in _LINES]
+    return [order for order in orders if seen[order].all()]

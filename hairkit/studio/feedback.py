@@ -9,7 +9,6 @@ import cv2
 import numpy as np
 
 from hairkit.arrays import UInt8Array
-from hairkit.types.capture import View
 
 DARK, BRIGHT = 45.0, 225.0
 """Mean grey levels below and above which hair shows no strands."""
@@ -18,21 +17,6 @@ SHARP = 18.0
 blur of two pixels brings rendered photos from above 100 to below it."""
 STILL = 6.0
 """Mean difference of grey levels between two pictures a third of a second apart."""
-NEAR, FAR = 0.8, 0.2
-"""Width of the head and its hair over the picture's that is too large, and too small; the outline's
-is 0.4, and 0.77 is the most of the captures, with curls all around."""
-TOP, ASIDE = 0.02, 0.16
-"""Height above the head that must be free, and distance of the head from the middle, as shares."""
-OVER_LINE = 2 / 3
-"""Share of the way from the dashed line to the picture's upper edge that hair may take. The line
-leaves room for a camera that moves; photos of captures whose hair took 0.65 of the way give hair as
-good as others."""
-HEAD_ROWS = 0.6
-"""Height of the part of a person that is taken for the head, over the width of the picture."""
-LIKELY, LEAST_PERSON = 0.5, 0.02
-"""Probability of the person in a pixel, and least share of such pixels for there to be one."""
-FACED_DEG = 50.0
-"""Azimuth up to which a face must be found."""
 MEASURED_WIDTH = 160
 """Width in pixels to which pictures are scaled before they are measured."""
 YAW_TOLERANCE_DEG = 14.0
@@ -104,56 +88,6 @@ def judge_photo(image: UInt8Array) -> list[Feedback]:
     if float(cv2.Laplacian(grey.astype(np.float32), cv2.CV_32F).var()) < SHARP:
         found.append(Feedback.BLURRED)
     return found
-
-
-def judge_view(view: View, azimuth_deg: float, line: float = 0.0) -> list[Feedback]:
-    """Return what is wrong with the framing and the direction of a picture of the turn.
-
-    Parameters
-    ----------
-    view
-        With face and person, where the networks for them are installed.
-    azimuth_deg
-        From where the picture should be taken.
-    line
-        Height of the line that the top of the hair should stay below, as a share of the picture's
-        from its top; 0 where none is drawn.
-    """
-    return _judge_framing(view, line) + _judge_angle(view, azimuth_deg)
-
-
-def _judge_framing(view: View, line: float) -> list[Feedback]:
-    if view.person is None:
-        return []
-    person = view.person.alpha > LIKELY * 255
-    if person.mean() < LEAST_PERSON:
-        return [Feedback.OUT_OF_FRAME]
-    height, width = person.shape
-    top = int(np.flatnonzero(person.any(axis=1))[0])
-    head = person[top : top + round(HEAD_ROWS * width)]
-    columns = np.flatnonzero(head.any(axis=0))
-    share = float(np.median(head.sum(axis=1))) / width
-    middle = float(np.average(np.arange(width), weights=head.sum(axis=0))) / width
-    found = []
-    if share > NEAR or len(columns) == width:
-        found.append(Feedback.TOO_NEAR)
-    elif share < FAR:
-        found.append(Feedback.TOO_FAR)
-    if top < TOP * height or abs(middle - 1 / 2) > ASIDE:
-        found.append(Feedback.OUT_OF_FRAME)
-    elif top < (1 - OVER_LINE) * line * height:
-        found.append(Feedback.ABOVE_LINE)
-    return found
-
-
-def _judge_angle(view: View, azimuth_deg: float) -> list[Feedback]:
-    wanted = (azimuth_deg + 180) % 360 - 180
-    face = view.face
-    if face is None or not face.sure:
-        known = face is not None or view.person is not None
-        return [Feedback.NO_FACE] if known and abs(wanted) < FACED_DEG else []
-    off = abs((face.yaw_deg - wanted + 180) % 360 - 180)
-    return [Feedback.WRONG_ANGLE] if off > YAW_TOLERANCE_DEG else []
 
 
 def for_pages() -> dict[str, object]:

@@ -26,7 +26,7 @@ from hairkit.options import make_options
 from hairkit.pipeline.recipe import Choice, Recipe, load_recipe
 from hairkit.pipeline.single_photo import SeenPhoto, see_photo
 from hairkit.stages import FACES, PERSONS
-from hairkit.studio.feedback import judge_view
+from hairkit.studio.framing import judge_view
 from hairkit.types.capture import View
 from hairkit.types.chosen import ChosenHair
 from hairkit.types.face import turn_points
@@ -54,11 +54,11 @@ LEAST_SURE = 0.1
 
 def look(request: dict[str, Any], tell: Tell) -> Any:
     """Return what is wrong with a small picture of the camera, `incoming`, for an `azimuth`."""
-    from hairkit.studio.capture_guides import hair_line  # loads OpenGL
+    from hairkit.studio.capture_guides import guide_at  # loads OpenGL
 
     image, _ = read_photo(request["incoming"], CAMERA_EDGE)
-    view, azimuth = _find(View("camera", 0.0, image)), float(request["azimuth"])
-    codes = [code.value for code in judge_view(view, azimuth, hair_line(azimuth))]
+    view, guide = _find(View("camera", 0.0, image)), guide_at(float(request["azimuth"]), 0.0)
+    codes = [code.value for code in judge_view(view, guide)]
     return {"feedback": codes, "yaw": None if view.face is None else view.face.yaw_deg}
 
 

@@ -15,7 +15,8 @@ from hairkit.errors import HairkitError
 from hairkit.head_model.template import default_head
 from hairkit.io.capture_reader import read_capture
 from hairkit.io.capture_toml import HeadEntry, head_entry, head_pose
-from hairkit.studio.feedback import EXAMPLES, Feedback, judge_photo, judge_view
+from hairkit.studio.feedback import EXAMPLES, Feedback, judge_photo
+from hairkit.studio.framing import judge_view
 from hairkit.studio.pose import Nudge, Placed
 from hairkit.studio.project import Project
 from hairkit.types.camera import Camera
@@ -174,7 +175,7 @@ def test_examples_show_what_they_are_named_after(monkeypatch: pytest.MonkeyPatch
     """The right picture has no fault; each wrong one has its own."""
     from docs.images import camera_examples as drawing
     from docs.images.camera_examples import GOOD, draw_examples
-    from hairkit.studio.capture_guides import hair_line
+    from hairkit.studio.capture_guides import guide_at
     from hairkit.types.face import Face
 
     monkeypatch.setattr(drawing, "STRANDS", 400)
@@ -182,9 +183,9 @@ def test_examples_show_what_they_are_named_after(monkeypatch: pytest.MonkeyPatch
     assert set(drawn) == set(EXAMPLES)
     for name, example in drawn.items():
         yaw = -38.0 if name == Feedback.WRONG_ANGLE else 0.0
-        face = Face(0.99, np.zeros((68, 2)), np.zeros(68), yaw, 0.0, 0.0)
+        face = Face(0.99, example.landmarks, np.zeros(68), yaw, 0.0, 0.0)
         view = View("front", 0.0, example.image, person=example.person, face=face)
-        codes = judge_photo(example.image) + judge_view(view, 0.0, hair_line(0.0))
+        codes = judge_photo(example.image) + judge_view(view, guide_at(0.0, 0.0))
         assert (codes == []) if name == GOOD else (Feedback(name) in codes), (name, codes)
 
 
