@@ -4,7 +4,7 @@ python .ci/wheel.py dist
 
 Kernels are compiled for any x86-64 processor of the last ten years (`hairkit.kernel_cache`) by
 running what people run first: reconstructions from photos alone, with masks and by every recipe,
-both simulators, pictures, the viewer, cards, another head and scores. Then the wheel does the same
+all simulators, pictures, the viewer, cards, another head and scores. Then the wheel does the same
 in an empty folder, without a cache. The exit code is 1 where that compiled anything, or where a
 module with kernels was not run and is not in `NOT_SHIPPED`.
 """
@@ -112,6 +112,7 @@ def commands(place: Path, out: Path) -> list[list[str]]:
         ["reconstruct", str(SAMPLE), "-o", str(out / "masks"), "--guides", "200"],
         ["reconstruct", photos, "-o", str(out / "photos"), "--guides", "200"],
         ["simulate", groom, "-o", str(out / "rods.npz"), *short],
+        ["simulate", groom, "-o", str(out / "pbd.npz"), "--using", "pbd", *short],
         ["simulate", groom, "-o", str(out / "helix.npz"), "--using", "super_helix", *short],
         ["render", groom, "-o", str(out / "hair.png")],
         ["view", groom, "--headless", "--script", script, "--out", str(out)],

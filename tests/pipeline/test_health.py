@@ -26,6 +26,7 @@ from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture, View
 from hairkit.types.groom import Groom
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
+from hairkit.types.orientation import OrientationMap, wrap_angle
 from hairkit.types.parting import Parting
 from hairkit.types.scene import Scene
 from hairkit.types.strands import Strands
@@ -58,7 +59,8 @@ class Run:
         self.masks = tuple(self._mask(camera) for camera in cameras)
         assert head.landmark_vertices is not None
         points = head.vertices[head.landmark_vertices].astype(np.float64)
-        self.hull: Hull = Manager.loaded(autoload=False).call(
+        plugins = Manager.loaded(autoload=False)
+        self.hull: Hull = plugins.call(
             "build_hull", "visual_hull", scene=self.scene, masks=self.masks
         )
         self.groom: Groom = grow("short", head, ROOTS, seed=1)
@@ -69,6 +71,10 @@ class Run:
                 for k, photo in enumerate(photos)
                 for seen in [cameras[k].project(points)]
             )
+        )
+        self.orientations = tuple(
+            plugins.call("orient", "structure_tensor", view=view, mask=mask)
+            for view, mask in zip(self.capture.views, self.masks, strict=True)
         )
         self.turn: Turnaround | None = self._turn(1.5)
         self.roots = len(self.groom.strands)
@@ -94,6 +100,7 @@ class Run:
         evidence = ball_evidence(
             masks=self.masks,
             scene=self.scene,
+            orientations=self.orientations,
             hull=self.hull,
             scalp_distance=replace(DISTANCE, hair_length=self.hair_length),
             parting=self.parting,
@@ -209,6 +216,12 @@ def combed_otherwise(run: Run) -> None:
     run.capture = replace(run.capture, views=striped)
 
 
+def blind(run: Run) -> None:
+    """The orienter is sure of nothing, and its angles are wrong."""
+    none = np.zeros((HEIGHT, WIDTH), np.float32)
+    run.orientations = (OrientationMap(none, none),) * 8
+
+
 def half_bald(run: Run) -> None:
     """No strand grows on the left half of the head."""
     points = run.groom.strands.resampled(21).points.reshape(-1, 21, 3)
@@ -248,6 +261,7 @@ FAULTS = {
     "turn: largest step": no_back,
     "parting: width of the skin": bare_hairline,
     "parting: sureness": unsure_crown,
+    "orient: directions as photographed": blind,
     "strands: directions as photographed": combed_otherwise,
     "strands: drawn where no photo has hair": combed_up,
     "strands: hair left bare": half_bald,
@@ -279,6 +293,19 @@ def test_short_hair_is_not_blamed_for_its_parting(run: Run) -> None:
     bare_hairline(run)
     run.hair_length = 0.02
     assert not [name for name in run.figures() if name.startswith("parting")]
+
+
+@pytest.mark.parametrize("confidence", [0.0, 1.0])
+def test_maps_that_are_wrong_everywhere_are_red(confidence: float, run: Run) -> None:
+    """They need not be empty: the field may be made without them, and all else be green."""
+    turned = tuple(
+        OrientationMap(wrap_angle(o.angle + np.pi / 2), np.full_like(o.angle, confidence))
+        for o in run.orientations
+    )
+    run.orientations = turned
+    lights = {name: figure.light for name, figure in run.figures().items()}
+    assert lights.pop("orient: directions as photographed") == RED
+    assert set(lights.values()) == {GREEN}
 
 
 def test_curls_are_not_blamed_for_their_coils(run: Run) -> None:
