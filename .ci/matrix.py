@@ -28,7 +28,7 @@ FOLDER = PROJECT / ".matrix"
 PYTHONS = ("3.11", "3.13")
 NUMPYS = {"1.26": "numpy==1.26.*", "newest": "numpy>=2,<3"}
 OPENCVS = {"4.11": "==4.11.*", "4": ">=4.12,<5", "5": ">=5,<6"}
-OPENCV = "opencv-contrib-python-headless"
+OPENCV = "opencv-python-headless"
 QUICK = ("tests/types", "tests/io", "tests/imaging", "tests/cameras", "tests/field")
 
 

@@ -32,8 +32,11 @@ Example: hairkit doctor
 Check Python, the packages, OpenGL, caches and plugins, and say what to install. The exit code is
 0 if hairkit's core works; problems with optional parts are notes."""
 
-_MODULES = {"opencv-contrib-python-headless": "cv2"}
+_MODULES = {"opencv-python-headless": "cv2"}
 """Distributions whose module has another name."""
+
+_NOT_FOR_USERS = ("all", "test", "docs", "dev")
+"""Extras for work on hairkit, and the one that stands for all others."""
 
 _NO_CACHE = "no locator available"
 """Numba's message if it has no folder for compiled code."""
@@ -83,7 +86,7 @@ def examine() -> Iterator[Finding]:
     yield from (_package(name) for name in core)
     yield _opencv_wheels([d.name for d in importlib.metadata.distributions()])
     yield from _graphics()
-    yield from (_extra(extra, names) for extra, names in extras.items())
+    yield from (_extra(*each) for each in extras.items() if each[0] not in _NOT_FOR_USERS)
     yield _kernel_cache()
     yield _networks()
     yield from _plugins()
@@ -123,7 +126,7 @@ def _opencv_wheels(installed: list[str]) -> Finding:
     """Check for several OpenCV wheels: they overwrite each other in the folder cv2."""
     wheels = sorted({name.lower() for name in installed if name.lower().startswith("opencv-")})
     if len(wheels) > 1:
-        cure = f"pip uninstall -y {' '.join(wheels)} && pip install opencv-contrib-python-headless"
+        cure = f"pip uninstall -y {' '.join(wheels)} && pip install opencv-python-headless"
         return Finding("opencv wheels", "FAIL", f"several share the folder cv2; {cure}")
     return Finding("opencv wheels", "ok", f"one: {', '.join(wheels) or 'a build without pip'}")
 
@@ -157,7 +160,7 @@ def _try_backend(backend: str) -> tuple[bool, str]:
 
 
 def _extra(extra: str, names: list[str]) -> Finding:
-    missing = [name for name in names if name != "hairkit" and not _is_installed(name)]
+    missing = [name for name in names if not _is_installed(name)]
     if missing:
         cure = f'pip install "hairkit[{extra}]"'
         return Finding(f"extra {extra}", "note", f"not there: {', '.join(missing)}; {cure}")

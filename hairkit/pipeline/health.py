@@ -394,7 +394,6 @@ def _misfit_mm(camera: Camera, points: Float64Array, seen: Float64Array | None) 
 
 def _hairy_share(mask: Mask, camera: Camera, points: Float32Array) -> float:
     """Return the share of the convex hull of points (N, 3) in the picture that is hair."""
-    corners = np.rint(camera.project(points)).astype(np.int32)
-    inside = np.zeros(mask.labels.shape, np.uint8)
-    cv2.fillConvexPoly(inside, cv2.convexHull(corners), 1)
+    corners, inside = camera.project(points), np.zeros(mask.labels.shape, np.uint8)
+    cv2.fillConvexPoly(inside, cv2.convexHull(np.rint(corners).astype(np.int32)), 1)
     return share_of((mask.hair & (inside > 0)).sum(), inside.sum())

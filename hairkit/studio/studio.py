@@ -253,6 +253,9 @@ class Studio:
                 await asyncio.wait_for(self._wanted.wait(), QUIET_S)
                 continue  # it changed again
             if not self._due():
+                if self.project.built == self.project.inputs():  # a change was undone
+                    self.project.draft.unlink(missing_ok=True)
+                    self.events.send("project", **self.summary())
                 self._set_build(**self._standing())
                 continue
             if self._touched is not None and self.project.groom.is_file():

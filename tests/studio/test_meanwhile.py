@@ -178,3 +178,23 @@ def test_a_change_ends_a_build_that_it_makes_useless(studio: Studio) -> None:
         await studio.close()
 
     run(story)
+
+
+def test_an_undone_stroke_takes_its_preview_along(studio: Studio) -> None:
+    """Where the hair is that of the strokes again, no preview says that hair is being made."""
+    calls = studio.builder.calls  # type: ignore[attr-defined]
+
+    async def story() -> None:
+        await studio.start()
+        await until(lambda: studio.build["state"] == "done")
+        studio.builder.pause_s = LONGEST_S  # type: ignore[attr-defined]
+        stroke(studio, 1, 20)
+        await until(lambda: len(calls) == 3)
+        assert studio.summary()["draft"]
+        studio.project.draw(1, {"flags": {"corrects": True}, "shapes": []})
+        studio.changed(touched=[studio.project.shot(1).file])
+        await until(lambda: studio.build["state"] == "done")
+        assert not studio.summary()["draft"]
+        await studio.close()
+
+    run(story)

@@ -182,27 +182,27 @@ class CapturePage {
     if (resting || !this.camera.running || !this.guides.length) return;
     const found = this.judge();
     if (!found.length && !this.looking) this.look();
-    if (this.looked.at === this.at) found.push(...this.looked.found);
-    this.guide.classList.toggle("right", !found.length);
+    const known = this.looked.at === this.at && performance.now() - this.looked.time < LOOKED_MS;
+    if (known) found.push(...this.looked.found);
+    const good = known && !found.length;
+    this.guide.classList.toggle("right", good);
     this.guide.classList.toggle("above", found.includes("above_line"));
     this.stage.dataset.feedback = found.join(" ");
     for (const item of this.examples.children) {
-      item.classList.toggle("now", item.dataset.example === (found[0] ?? "good"));
+      item.classList.toggle("now", item.dataset.example === (good ? "good" : found[0]));
     }
-    if (!found.length) { this.wait(); return; }
+    if (good) { this.wait(); return; }
     this.goodFor = 0;
-    this.voice.tell(...this.advice[found[0]]);
+    if (found.length) this.voice.tell(...this.advice[found[0]]);
   }
 
-  // All is right: releases the shutter when it has been so for a while and the server agrees.
+  // All is right, the server agrees: releases the shutter when it has been so for a while.
   wait() {
     this.goodFor += CHECK_MS / 1000;
     const level = !this.guides[this.at].elevation;
     const alone = this.automatic && this.pressed && level;
     this.voice.tell(alone ? "Good, hold still" : "Good: press the shutter", "Good");
-    const { at, time } = this.looked;
-    const known = at === this.at && performance.now() - time < LOOKED_MS;
-    if (alone && known && this.goodFor > READY_S && !this.taken.has(this.at)) this.take();
+    if (alone && this.goodFor > READY_S && !this.taken.has(this.at)) this.take();
   }
 
   // The first shot is always the user's: it says that the turn begins.
