@@ -31,9 +31,15 @@ def frozen_array(
     """Return `value` as a read-only contiguous array; `None` in `shape` matches any size.
 
     An array that is read-only and owns its memory is shared, any other one copied. Raises
-    `DataError` naming the array when the shape differs or a float is not finite.
+    `DataError` naming the array when the shape differs, a float is not finite, or numbers are not
+    those of the type: complex ones, or parts where whole ones are wanted.
     """
+    given = np.asarray(value)
+    if given.dtype.kind == "c":
+        raise DataError(f"{name} has complex numbers, expected real ones")
     array = np.ascontiguousarray(value, dtype=dtype)
+    if array.dtype.kind in "iu" and given.dtype.kind == "f" and (given != array).any():
+        raise DataError(f"{name} has numbers with fractions, expected whole ones")
     if array.ndim != len(shape) or any(
         want is not None and want != have for want, have in zip(shape, array.shape, strict=True)
     ):

@@ -6,6 +6,7 @@ writes them, are read too: edges that share vertices are put together.
 
 from __future__ import annotations
 
+import codecs
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -44,7 +45,9 @@ def export_groom(groom: Groom, path: Path, options: Options) -> bool:
 @hookimpl
 def import_groom(path: Path, options: Options) -> Groom:
     """Read all lines as strands; faces are passed over, and a head is put under the strands."""
-    vertices, lines, before = _elements(read_bytes(path).decode("latin-1"))
+    vertices, lines, before = _elements(
+        read_bytes(path).removeprefix(codecs.BOM_UTF8).decode("latin-1")
+    )
     if not lines:
         raise FormatError(f"{path}: holds no lines ('l' elements), so no strands")
     points = _points(vertices, path)

@@ -50,7 +50,7 @@ import traceback
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
-from hairkit.errors import DivergedError, HairkitError, one_line
+from hairkit.errors import DivergedError, HairkitError, InputError, one_line
 from hairkit.system import utf8_name
 
 VERBS = {
@@ -119,7 +119,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     _log_to_stderr(logging.DEBUG if debug else logging.WARNING)
     try:
         for word in words:
-            utf8_name(word)  # refused before any work
+            if not utf8_name(word):  # refused before any work
+                raise InputError("an argument is empty; is a variable of the shell not set?")
         return _run(words)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # so that the exit's flush stays quiet too

@@ -70,9 +70,7 @@ def run(args: argparse.Namespace) -> int:
     settings = split_settings(manager, {"reader": reader, "writer": writer}, args.set)
     reading = reader_settings(manager, reader, args) | settings["reader"]
     options = manager.options(writer, settings["writer"])
-    check_target(target)
-    if target.exists() and target.samefile(source):
-        raise InputError(f"{target}: is the input file; choose another output")
+    check_target(target, source)
     groom = load_groom(manager, source, reading, reader)
     if args.guides is not None:
         groom = decimate(groom, args.guides)

@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
     plugins = {"reader": importer_of(manager, source), "writer": exporter}
     settings = split_settings(manager, plugins, args.set)
     options = manager.options(exporter, settings["writer"])
-    check_target(target)
+    check_target(target, source)
     groom = load_groom(manager, source, settings["reader"])
     manager.call("export_groom", exporter, options, groom=groom, path=target)
     print_written(args, target)
@@ -62,6 +62,9 @@ def _run_for_engine(args: argparse.Namespace, manager: Manager) -> int:
         raise InputError(f"--for {args.engine} chooses the plugins; leave --using out")
     reader = importer_of(manager, Path(args.groom))
     settings = split_settings(manager, {"reader": reader}, args.set)["reader"]
+    if Path(args.out).is_dir():
+        for file in ENGINES[args.engine]:
+            check_target(Path(args.out, file.name), Path(args.groom))
     groom = load_groom(manager, Path(args.groom), settings)
     print_written(args, *export_for(groom, args.engine, args.out, manager=manager))
     return 0

@@ -31,9 +31,11 @@ def print_written(
         print("\n".join(lines or names))
 
 
-def check_target(path: Path) -> None:
-    """Raise `InputError` if a file cannot be written there, before any work is done."""
+def check_target(path: Path, source: Path | None = None) -> None:
+    """Raise `InputError` if a file cannot be written there, or is the one that will be read."""
     if not path.parent.is_dir():
         raise InputError(f"{path.parent}: no such folder; make it first")
     if path.is_dir():
         raise InputError(f"{path}: is a folder; name a file")
+    if source is not None and path.exists() and source.exists() and path.samefile(source):
+        raise InputError(f"{path}: is the input file; choose another output")

@@ -159,7 +159,7 @@ class _Custom:
         if name not in attributes:
             return None
         values = self.file.numbers(attributes[name])
-        count = self.file.document["accessors"][attributes["POSITION"]]["count"]
+        count = self.file.item("accessors", attributes["POSITION"])["count"]
         if values.shape != (count, 1) or not np.isfinite(values).all():
             raise ValueError(f"{name} is not a finite number for each point")
         column: Float64Array = values[self.order, 0]

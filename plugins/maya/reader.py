@@ -71,7 +71,7 @@ def read_curves(text: str, path: Path) -> MayaCurves:
     index: dict[str, int] = {}
     made: list[tuple[int, Float64Array, Int64Array, Float64Array]] = []
     metres = CENTIMETRE
-    for statement in _statements(text):
+    for statement in _statements(text, path):
         if statement.startswith("createNode"):
             _create(nodes, index, statement)
         elif nodes and nodes[-1].kind == "nurbsCurve" and _CURVE.match(statement):
@@ -86,8 +86,8 @@ def read_curves(text: str, path: Path) -> MayaCurves:
     return _evaluated(nodes, made, metres, path)
 
 
-def _statements(text: str) -> Iterator[str]:
-    """Yield the statements without their semicolons and comments."""
+def _statements(text: str, path: Path) -> Iterator[str]:
+    """Yield the statements without their semicolons and comments; the last one must be whole."""
     pieces: list[str] = []
     start = 0
     for mark in _MARK.finditer(text):
@@ -98,6 +98,8 @@ def _statements(text: str) -> Iterator[str]:
         elif mark[0].startswith("//"):
             pieces.append(text[start : mark.start()])
             start = mark.end()
+    if "".join([*pieces, text[start:]]).strip():
+        raise FormatError(f"{path}: ends within a command, as a file that was cut off does")
 
 
 def _words(statement: str) -> list[str]:

@@ -49,6 +49,9 @@ def test_native_copies_are_equal(groom_file: Path) -> None:
         (["groom.npz", "--for", "unreal", "-o", "groom.npz"], "groom.npz: not a folder"),
         (["groom.npz", "--for", "unreal", "-o", "b", "--using", "fbx"], "leave --using out"),
         (["none.npz", "--for", "unreal", "-o", "b"], "no such file"),
+        (["groom.npz", "--for", "unreal", "-o", ""], "an argument is empty"),
+        (["", "-o", "b.npz"], "an argument is empty"),
+        (["groom.npz", "-o", "groom.npz"], "groom.npz: is the input file"),
     ],
 )
 def test_wrong_words_get_one_line(
@@ -65,6 +68,22 @@ def test_wrong_words_get_one_line(
     assert reason in printed
     assert printed.count("\n") == 1
     assert not (groom_file.parent / "b.npz").exists()
+
+
+@pytest.mark.parametrize("words", [["-o", "web/hair.glb"], ["--for", "web", "-o", "web"]])
+def test_what_is_read_is_not_written_over(
+    groom_file: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    words: list[str],
+) -> None:
+    """A file of bare strands would come back with a head that it never had."""
+    monkeypatch.chdir(groom_file.parent)
+    assert main(["export", "groom.npz", "--for", "web", "-o", "web"]) == 0
+    before = Path("web/hair.glb").read_bytes()
+    assert main(["export", "web/hair.glb", *words]) == 2
+    assert "web/hair.glb: is the input file" in capsys.readouterr().err
+    assert Path("web/hair.glb").read_bytes() == before
 
 
 def info(capsys: pytest.CaptureFixture[str], path: Path) -> dict[str, object]:

@@ -128,5 +128,13 @@ def test_texts_that_never_end_take_no_time(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     """Half a megabyte of quotes and escapes is read through once."""
-    with caplog.at_level(logging.ERROR), pytest.raises(FormatError, match="holds no nurbsCurve"):
+    with caplog.at_level(logging.ERROR), pytest.raises(FormatError, match="ends within a command"):
         read(tmp_path, 'createNode x "' + '\\"' * 250_000)
+
+
+def test_a_scene_that_was_cut_off_is_refused(manager: Manager, tmp_path: Path) -> None:
+    """Half of the curves is not silently taken for all."""
+    manager.call("export_groom", "maya", groom=bristle_groom(), path=tmp_path / "a.ma")
+    text = (tmp_path / "a.ma").read_text()
+    with pytest.raises(FormatError, match=r"a\.ma: ends within a command"):
+        read(tmp_path, text[: len(text) // 2])

@@ -37,6 +37,13 @@ def test_write_read_write_gives_the_same_bytes(tmp_path: Path) -> None:
 POINTS = "v 0 0.1 0\nv 0 0.12 0\nv 0 0.13 0\nv 0.1 0 0\nv 0.13 0 0\n"
 
 
+def test_a_byte_order_mark_is_no_part_of_the_first_vertex(tmp_path: Path) -> None:
+    """Editors on Windows write one."""
+    (tmp_path / "a.obj").write_text(f"\ufeff{POINTS}l 1 2 3\n", encoding="utf-8")
+    read = obj.import_groom(tmp_path / "a.obj", obj.Options(scale=1.0))
+    assert len(read.strands.points) == 3
+
+
 @pytest.mark.parametrize(
     "lines",
     [

@@ -51,3 +51,33 @@ def point_phone(page: Any, heading_deg: float) -> None:
         "DeviceOrientation.setDeviceOrientationOverride",
         {"alpha": -heading_deg % 360, "beta": 90, "gamma": 0},
     )
+
+
+def test_nothing_is_good_before_the_server_has_seen_it(page: Any, story: Any) -> None:
+    """The page says so when the server finds no fault, never before, and names what it finds."""
+    answers: list[list[str]] = []
+
+    def any_light(route: Any) -> None:
+        said = route.fetch().json()
+        said["limits"] |= {"dark": -1, "bright": 999, "sharp": -1, "still": 999}
+        route.fulfill(json=said)
+
+    def look(route: Any) -> None:
+        route.fulfill(json={"feedback": answers[0]}) if answers else route.abort()
+
+    page.route("**/api/feedback", any_light)
+    page.route("**/api/look/*", look)
+    go(page, story, "capture")
+    page.locator(".ring path.taken").first.wait_for()
+    page.get_by_role("button", name="Back one").click()  # from the view above to the last one
+    page.locator(".stage[data-feedback]").wait_for()
+    page.wait_for_timeout(800)
+    assert not page.locator(".guide.right").count()
+    assert not page.locator(".hint").inner_text().startswith("Good")
+    page.trouble.clear()  # the browser names the requests that got no answer
+    answers.append([])
+    page.locator(".guide.right").wait_for()
+    assert page.locator(".hint").inner_text().startswith("Good")
+    answers[0] = ["out_of_frame"]
+    page.locator(".hint", has_text="Put the head into the outline").wait_for()
+    assert not page.locator(".guide.right").count()

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hairkit.errors import InputError
+from hairkit.errors import DataError, InputError
 from hairkit.types.strands import Strands
 
 
@@ -194,3 +194,18 @@ def test_an_index_gives_one_polyline() -> None:
             strands[index]
     with pytest.raises(TypeError):
         strands["0"]  # type: ignore[index]
+
+
+@pytest.mark.parametrize(
+    ("points", "offsets", "reason"),
+    [
+        (np.zeros((4, 3), np.complex64), [0, 4], "strand points has complex numbers"),
+        (np.zeros((4, 3)), [0.0, 1.5, 4.0], "strand offsets has numbers with fractions"),
+    ],
+)
+def test_numbers_of_another_kind_are_refused(
+    points: np.ndarray, offsets: list[float], reason: str
+) -> None:
+    """Nothing is cut off to make them fit."""
+    with pytest.raises(DataError, match=reason):
+        Strands(points, np.array(offsets))
