@@ -4,8 +4,8 @@ python benchmarks/super_helix.py --pictures pictures/
 
 600 guides of a procedural groom, frames of 1/60 s with default options: a still head, a head
 shaken by 25 degrees 1.5 times a second (long straight hair), and wind of 5 m/s with gusts (long
-wavy hair). `cpu ms` is the time of all threads together. The second table is one step of both
-solvers without contact and neighbours.
+wavy hair). `cpu ms` is the time of all threads together. The second table is one step
+without contact and neighbours.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import cv2
@@ -32,6 +31,8 @@ from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
 GUIDES, ELEMENTS, FRAMES = 600, 10, 90
+STEPS = 20
+"""That are timed for each number of elements."""
 
 
 def main() -> None:
@@ -48,14 +49,10 @@ def main() -> None:
         scene("still head", straight, static_motion(), np.zeros(3), folder, elements)
         scene("shaken head", straight, shake, np.zeros(3), folder, elements)
         scene("wind", wavy, static_motion(), np.array([4.0, 0.0, -3.0]), folder, elements)
-    print("\n| elements | recursion ms a step | conjugate gradients ms a step |")
-    print("|---|---|---|")
+    print("\n| elements | ms a step |")
+    print("|---|---|")
     for elements in (5, 10, 20, 40):
-        print(
-            f"| {elements} | "
-            + " | ".join(f"{ms:.1f}" for ms in solvers(straight, elements))
-            + " |"
-        )
+        print(f"| {elements} | {step_ms(straight, elements):.1f} |")
 
 
 def scene(
@@ -98,31 +95,17 @@ def picture(groom: Groom, simulator: SuperHelices, head: np.ndarray, path: Path)
     cv2.imwrite(str(path), image[..., ::-1])
 
 
-def solvers(groom: Groom, elements: int) -> tuple[float, float]:
-    """Return milliseconds of a step of 600 strands by both solvers."""
-
-    def timed(run: Callable[[], None], count: int) -> float:
-        run()
-        start = time.perf_counter()
-        for _ in range(count):
-            run()
-        return 1e3 * (time.perf_counter() - start) / count
-
-    plain = Options(elements=elements, contact=False, hair_friction=0.0, hair_push=0.0, substeps=1)
-    fast = SuperHelices(groom, plain)
-    few = dataclasses.replace(
-        groom,
-        strands=groom.strands.select(np.arange(6)),
-        root_triangle=groom.root_triangle[:6],
-        root_barycentric=groom.root_barycentric[:6],
+def step_ms(groom: Groom, elements: int) -> float:
+    """Return milliseconds of a step of all strands."""
+    options = Options(
+        elements=elements, contact=False, hair_friction=0.0, hair_push=0.0, substeps=1
     )
-    slow = SuperHelices(few, dataclasses.replace(plain, solver="conjugate_gradients"))
-    around = Surroundings()
-    scale = len(groom.strands) / 6
-    return (
-        timed(lambda: fast.advance(1 / 60, around), 20),
-        scale * timed(lambda: slow.advance(1 / 60, around), 3),
-    )
+    simulator, around = SuperHelices(groom, options), Surroundings()
+    simulator.advance(1 / 60, around)
+    start = time.perf_counter()
+    for _ in range(STEPS):
+        simulator.advance(1 / 60, around)
+    return 1e3 * (time.perf_counter() - start) / STEPS
 
 
 if __name__ == "__main__":

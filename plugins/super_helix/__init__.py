@@ -2,8 +2,8 @@
 
 Bertails et al., "Super-helices for predicting the dynamics of natural hair", 2006, with the shape
 taken from the groom by floating tangents and inverse statics, so that it rests as captured, and
-each implicit step solved in linear time (Bertails, "Linear time super-helices", 2009) or densely by
-conjugate gradients as in the patent. Contact with the head has Coulomb friction; hair around a
+each implicit step solved in linear time (Bertails, "Linear time super-helices", 2009), where the
+patent takes conjugate gradients. Contact with the head has Coulomb friction; hair around a
 point drags and pushes it. Nothing stretches.
 
 * `binding`: guides to rods and back
@@ -11,10 +11,8 @@ point drags and pushes it. Nothing stretches.
 * `element_kernels`: compiled kinematics of one element
 * `elimination`: solve from tip to root in linear time
 * `hair_contact`: hair-hair contact on a grid
-* `kinematics`: kinematics of a rod in NumPy
 * `linear_time_step`: an implicit step of all strands
 * `options`: settings
-* `reference`: the same step by a dense matrix
 * `rods`: elements, natural curvatures, masses
 * `simulator`: the simulator
 * `state`: inputs of a step

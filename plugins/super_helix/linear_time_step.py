@@ -5,7 +5,7 @@ twist V = (turn, move) of an element's first frame and its own change dq, an ele
 quadratic form; eliminating dq from the tip to the root leaves one form in V at each joint (the
 articulated inertia of Featherstone, "Rigid Body Dynamics Algorithms", 2008, chapter 7, here with
 elements that bend), and going back from the clamped root gives all dq. Bertails, "Linear time
-super-helices", Eurographics 2009. `reference.py` forms and solves the same system densely.
+super-helices", Eurographics 2009. Tests form and solve the same system densely.
 """
 
 from __future__ import annotations

@@ -44,8 +44,3 @@ class Options:
     second_order: bool = option(
         True, doc="BDF2, which keeps swings; false is Euler's step, which damps them."
     )
-    solver: str = option(
-        "recursion",
-        choices=("recursion", "conjugate_gradients"),
-        doc="How a step is solved: in linear time, or densely as in the patent (slow).",
-    )

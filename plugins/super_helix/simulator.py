@@ -20,7 +20,6 @@ from .binding import bind_rods, carry_points
 from .hair_contact import Neighbours
 from .linear_time_step import place_points, step_strands
 from .options import Options
-from .reference import step_densely
 from .rods import NODES, Rods
 from .state import Body, Loads, Motion, Step
 from .statics import rest_as_captured
@@ -116,10 +115,7 @@ class SuperHelices(GuideSimulator):
         )
         self._move_hands(around, GRAB_SPEED * seconds)
         loads = self._loads(around, air)
-        if options.solver == "recursion":
-            parallel_for(step_strands, len(self._rods.roots), self._rods, self._motion, loads, step)
-        else:
-            step_densely(self._rods, self._motion, loads, step)
+        parallel_for(step_strands, len(self._rods.roots), self._rods, self._motion, loads, step)
         self._head, self._torso, self._before = step.head, torso, seconds
         self._points = None
         self._time += seconds

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helix_slopes import mean_rotation_slope, turn_slopes
 from scipy.integrate import solve_ivp
 
 from hairkit.helices.helix import (
     along_arc,
     mean_rotation,
-    mean_rotation_slope,
     rotation,
     turn_coefficients,
-    turn_slopes,
 )
 
 

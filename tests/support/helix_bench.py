@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from hairkit_plugins.super_helix.kinematics import place
 from hairkit_plugins.super_helix.linear_time_step import step_strands
 from hairkit_plugins.super_helix.rods import NODES, Rods
 from hairkit_plugins.super_helix.state import Body, Loads, Motion, Step
 from hairkit_plugins.super_helix.statics import gravity_forces
+from helix_kinematics import place
 
 from hairkit.simulation.obstacle_kernels import NO_FIELDS
 

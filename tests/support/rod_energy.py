@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from hairkit_plugins.super_helix.kinematics import Placed
 from hairkit_plugins.super_helix.rods import Rods
+from helix_kinematics import Placed
 
 from hairkit.arrays import Float64Array
 

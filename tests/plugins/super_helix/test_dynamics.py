@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import helix_reference as reference
 import numpy as np
 import pytest
 import rod_energy
-from hairkit_plugins.super_helix import element_kernels, reference
-from hairkit_plugins.super_helix.kinematics import move_slopes, moves, place
+from hairkit_plugins.super_helix import element_kernels
 from hairkit_plugins.super_helix.linear_time_step import Strand, newton, step_strands
 from hairkit_plugins.super_helix.rods import NODES, Rods
 from hairkit_plugins.super_helix.state import Body, Loads, Motion, Step
 from hairkit_plugins.super_helix.statics import gravity_forces, rest_as_captured
 from helix_bench import DOWN, energy, free, random_rods, rest, rod, run, step_of
+from helix_kinematics import move_slopes, moves, place
 from scipy.integrate import solve_ivp
 
 from hairkit.helices.helix import mean_rotation, rotation

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+import helix_reference as reference
 import numpy as np
 import pytest
 import rod_energy
-from hairkit_plugins.super_helix import reference
-from hairkit_plugins.super_helix.kinematics import move_slopes, place
 from hairkit_plugins.super_helix.statics import gravity_slopes, rest_as_captured
 from helix_bench import (
     ALONG_DOWN,
@@ -21,6 +20,7 @@ from helix_bench import (
     tip,
     total_forces,
 )
+from helix_kinematics import move_slopes, place
 from scipy.linalg import eigh
 from scipy.optimize import brentq, root
 

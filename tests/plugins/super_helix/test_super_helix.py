@@ -165,24 +165,6 @@ def test_frames_do_not_depend_on_threads(monkeypatch: pytest.MonkeyPatch) -> Non
     np.testing.assert_array_equal(*results)
 
 
-def test_both_solvers_move_alike() -> None:
-    """The patent's conjugate gradients give the default's frames."""
-    groom = hanging()
-    groom = dataclasses.replace(
-        groom,
-        strands=groom.strands.select([0, 5]),
-        root_triangle=groom.root_triangle[[0, 5]],
-        root_barycentric=groom.root_barycentric[[0, 5]],
-    )
-    frames = []
-    for solver in ("recursion", "conjugate_gradients"):
-        simulator = SuperHelices(groom, dataclasses.replace(FEW, solver=solver, contact=False))
-        for frame in range(4):
-            simulator.advance(1 / 60, Surroundings(turned(0.1 * frame)))
-        frames.append(simulator.points)
-    np.testing.assert_allclose(*frames, rtol=0, atol=1e-5)
-
-
 def test_hair_around_drags_to_its_own_speed(rng: np.random.Generator) -> None:
     """Hair that moves as one is not dragged; mixed hair is drawn to the mean of its place."""
     points, masses = rng.uniform(0, 0.05, (2000, 3, 3)), np.ones((2000, 3))

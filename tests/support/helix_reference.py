@@ -1,22 +1,21 @@
 """The same step formed densely and solved by conjugate gradients, as in the patent.
 
-Readable twin of `linear_time_step.py`, one strand at a time. Mass matrix and forces are those of
-Bertails et al. 2006, section 4: M = J' m J, K = diag(l GJ, l EI, l EI). The step is
-implicit (Euler or BDF2) in place of the text's semi-implicit one: its Coriolis forces arise from
-the Gauss points' own velocities.
+Readable twin of `hairkit_plugins.super_helix.linear_time_step`, one strand at a time. Mass matrix
+and forces are those of Bertails et al. 2006, section 4: M = J' m J, K = diag(l GJ, l EI, l EI). The
+step is implicit (Euler or BDF2) in place of the text's semi-implicit one: its Coriolis forces arise
+from the Gauss points' own velocities.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from hairkit_plugins.super_helix.contact import Point, touch
+from hairkit_plugins.super_helix.rods import NODES, Rods
+from hairkit_plugins.super_helix.state import CLOSE, FAR, Loads, Motion, Step
+from helix_kinematics import place
 from scipy.sparse.linalg import LinearOperator, cg
 
 from hairkit.arrays import Float64Array
-
-from .contact import Point, touch
-from .kinematics import place
-from .rods import NODES, Rods
-from .state import CLOSE, FAR, Loads, Motion, Step
 
 _MOST_ROUNDS = 40
 """Conjugate gradient steps per unknown: without rounding one would do."""

@@ -10,11 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from hairkit_plugins.super_helix.rods import SHARES, Rods
+from helix_slopes import mean_rotation_slope
 
 from hairkit.arrays import Float64Array
-from hairkit.helices.helix import mean_rotation, mean_rotation_slope, rotation
-
-from .rods import SHARES, Rods
+from hairkit.helices.helix import mean_rotation, rotation
 
 _TANGENT = np.array([1.0, 0.0, 0.0])
 
