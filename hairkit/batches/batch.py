@@ -72,16 +72,20 @@ def batch(
         No capture can be done at all: recipe, plugins or folders are at fault. What goes wrong with
         one capture is its result's `error`.
     """
-    given = settings if isinstance(settings, Settings) else Settings(**settings or {})
-    shared = replace(given, recipe=os.fspath(recipe)) if recipe != "default" else given
+    shared = _shared(settings, os.fspath(recipe))
     limits = JobLimits(seconds, _bytes(capture_memory_gib), retries)
     pool = _pool(client, workers, threads, memory_gib, limits)
-    jobs = find_jobs(captures, out, only)
-    jobs = part_of(jobs, part) if part is not None else jobs
+    jobs = part_of(find_jobs(captures, out, only), part)
     digest = shared.digest(Manager.loaded(shared.plugin_files))
     if not is_url(out):
         Path(out).mkdir(parents=True, exist_ok=True)
     return _results(jobs, shared, digest, pool, watcher)
+
+
+def _shared(settings: Mapping[str, Any] | Settings | None, recipe: str) -> Settings:
+    """Return the settings of all captures; a recipe that is named replaces theirs."""
+    given = settings if isinstance(settings, Settings) else Settings(**settings or {})
+    return replace(given, recipe=recipe) if recipe != "default" else given
 
 
 def _pool(

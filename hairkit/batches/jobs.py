@@ -171,13 +171,13 @@ def _listed(path: Path) -> dict[str, str]:
     return dict(sorted(found.items()))
 
 
-def part_of(jobs: Sequence[Job], text: str) -> tuple[Job, ...]:
-    """Return every N-th job from the K-th on: `part_of(jobs, "2/5")`.
+def part_of(jobs: Sequence[Job], text: str | None) -> tuple[Job, ...]:
+    """Return every N-th job from the K-th on: `part_of(jobs, "2/5")`; all without a text.
 
     >>> part_of([Job(name, "", "") for name in "abcde"], "2/3")[1].name
     'e'
     """
-    number, slash, count = text.partition("/")
+    number, slash, count = ("1/1" if text is None else text).partition("/")
     whole = slash and number.isdecimal() and count.isdecimal()
     if not whole or not 1 <= int(number) <= int(count):
         raise InputError(f"part {text!r}, expected K/N with K from 1 to N: 2/5")

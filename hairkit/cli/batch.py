@@ -139,7 +139,7 @@ def _run(args: argparse.Namespace, client: Any) -> list[Result]:
     from hairkit.cli.batch_table import table_for
 
     jobs = find_jobs(args.captures, args.out, args.only)
-    count = len(jobs if args.part is None else part_of(jobs, args.part))
+    count = len(part_of(jobs, args.part))
     results = []
     with table_for(sys.stderr, count, quiet=args.quiet or args.json) as table:
         for result in batch(

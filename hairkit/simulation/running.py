@@ -86,11 +86,7 @@ def run(
     with announce_compilation(told.message):
         for frame, time in enumerate(times):
             head = motion(float(time))
-            if not frame:
-                simulator.reset(head)
-            else:
-                around = Surroundings(head, air.wind, air.turbulence, air.gravity)
-                simulator.advance(1.0 / frames_per_second, around)
+            _move(simulator, head, 1.0 / frames_per_second if frame else 0.0, air)
             if frame >= before:
                 _check_points(simulator.points, points.shape[1:], float(time))
                 stretched = _check_stretch(simulator, stretched, frames_per_second, float(time))
@@ -98,6 +94,15 @@ def run(
             told.stepped(STAGE)
     told.finished(STAGE, perf_counter() - began, False)
     return PointCache(points, times[:frames], heads)
+
+
+def _move(simulator: Simulator, head: Float64Array, seconds: float, air: Weather) -> None:
+    """Go on to a head (4, 4) by `seconds`; by none, begin at rest on it."""
+    if not seconds:
+        simulator.reset(head)
+        return
+    around = Surroundings(head, air.wind, air.turbulence, air.gravity)
+    simulator.advance(seconds, around)
 
 
 def _allocate_frames(frames: int, points: int) -> Float32Array:
