@@ -93,8 +93,8 @@ def contact_sheet(
         [mask_picture(photo, mask) for photo, mask in zip(photos, evidence.masks, strict=True)],
         [_hsv_picture(map_, size) for map_ in evidence.orientations],
         _hull_pictures(evidence.hull, cameras),
-        _guide_pictures(groom, cameras),
-        _hair_pictures(groom, cameras),
+        _hair_pictures(groom, groom.strands, cameras, show_direction=True),
+        _hair_pictures(groom, densify(groom, HAIRS), cameras, show_direction=False),
     )
     pictures = _arrange(rows, [view.name for view in capture.views], size)
     return np.concatenate([pictures, _health_lines(health, pictures.shape[1])])
@@ -158,29 +158,18 @@ def _hull_pictures(hull: Hull, cameras: Sequence[Camera]) -> list[UInt8Array]:
     return draw_views(nothing, None, cameras, solids=[clay], lights=_lights())
 
 
-def _guide_pictures(groom: Groom, cameras: Sequence[Camera]) -> list[UInt8Array]:
-    guides = groom.strands.resampled(GUIDE_POINTS)
+def _hair_pictures(
+    groom: Groom, strands: Strands, cameras: Sequence[Camera], show_direction: bool
+) -> list[UInt8Array]:
+    """Return pictures of the groom's guides, or of its hair, on its head."""
     return draw_views(
-        guides,
+        strands.resampled(GUIDE_POINTS),
         groom.head,
         cameras,
         material=groom.material,
         lights=_lights(),
         bust=True,
-        show_direction=True,
-        skin=LOOK,
-    )
-
-
-def _hair_pictures(groom: Groom, cameras: Sequence[Camera]) -> list[UInt8Array]:
-    hair = densify(groom, HAIRS).resampled(GUIDE_POINTS)
-    return draw_views(
-        hair,
-        groom.head,
-        cameras,
-        material=groom.material,
-        lights=_lights(),
-        bust=True,
+        show_direction=show_direction,
         skin=LOOK,
     )
 

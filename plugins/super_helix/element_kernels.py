@@ -1,4 +1,4 @@
-"""Compiled kinematics of one element; `kinematics.py` and hairkit.helices.helix are its twins."""
+"""Compiled kinematics of one element; hairkit.helices.helix has what they are made of."""
 
 from __future__ import annotations
 
