@@ -63,6 +63,7 @@ class Studio:
         self._tasks = [asyncio.create_task(self._look()), asyncio.create_task(self._build_always())]
         self.build = self._standing()
         if self.build["state"] == "done":
+            self.project.draft.unlink(missing_ok=True)  # left by a studio that was killed
             self._touched = set()
             self._tasks.append(asyncio.create_task(self._warm_up()))
         else:

@@ -196,5 +196,12 @@ def test_an_undone_stroke_takes_its_preview_along(studio: Studio) -> None:
         await until(lambda: studio.build["state"] == "done")
         assert not studio.summary()["draft"]
         await studio.close()
+        studio.project.draft.write_bytes(b"packet")  # as a studio leaves it that is killed
+        again = Studio(studio.project, 600)
+        for name in ("editor", "builder", "drafter"):
+            setattr(again, name, getattr(studio, name))
+        await again.start()
+        assert not again.summary()["draft"]
+        await again.close()
 
     run(story)
