@@ -277,7 +277,7 @@ def assess_orientations(capture: Capture, evidence: Evidence) -> tuple[Figure, .
     shares = [share_oriented(found, view.image, mask) for found, view, mask in rows]
     share, name = float(np.mean(shares)), _worst(evidence.scene.names, shares)
     note = f"its plugin does not see the strands of the photos, least of all in {name}"
-    return (Figure("orient", "directions as photographed", share, "", ORIENTED.light(share), note),)
+    return (Figure("orient", "angles as photographed", share, "", ORIENTED.light(share), note),)
 
 
 def assess_parting(parting: Parting) -> tuple[Figure, ...]:

@@ -261,7 +261,7 @@ FAULTS = {
     "turn: largest step": no_back,
     "parting: width of the skin": bare_hairline,
     "parting: sureness": unsure_crown,
-    "orient: directions as photographed": blind,
+    "orient: angles as photographed": blind,
     "strands: directions as photographed": combed_otherwise,
     "strands: drawn where no photo has hair": combed_up,
     "strands: hair left bare": half_bald,
@@ -304,7 +304,7 @@ def test_maps_that_are_wrong_everywhere_are_red(confidence: float, run: Run) -> 
     )
     run.orientations = turned
     lights = {name: figure.light for name, figure in run.figures().items()}
-    assert lights.pop("orient: directions as photographed") == RED
+    assert lights.pop("orient: angles as photographed") == RED
     assert set(lights.values()) == {GREEN}
 
 
