@@ -257,9 +257,7 @@ def _hair_crosses(view: View, corners: Float64Array, width: float) -> bool:
     """Return whether hair crosses the lower edge of a part of the picture."""
     (left, top), (right, bottom) = corners.astype(int)
     part = np.s_[top:bottom, left:right]
-    person = None
-    if view.person is not None:
-        person = view.person.alpha[part].astype(np.float32) / np.float32(255)
+    person = None if view.person is None else view.person.part(part)
     landmarks = likely_landmarks(view)
     if landmarks is not None:
         landmarks = landmarks - corners[0]

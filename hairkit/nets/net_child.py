@@ -1,8 +1,9 @@
 """The program that loads and runs networks, asked by `NetProcess`.
 
-It may die of a bad model file without harm. Asked `{"do": "run", "model": PATH, "folder": FOLDER}`
-it takes the pictures (N, H, W, C) of `batch.npz` in that folder, and writes `outputs.npz` there:
-the outputs for that batch, "0" the largest.
+It may die of a bad model file without harm. Asked `{"do": "shape", "model": PATH}` it answers the
+shape of the network's input. Asked `{"do": "run", "model": PATH, "folder": FOLDER}` it takes the
+pictures (N, H, W, C) of `batch.npz` in that folder, and writes `outputs.npz` there: the outputs for
+that batch, "0" the largest.
 """
 
 from __future__ import annotations
@@ -17,13 +18,20 @@ import numpy as np
 from hairkit import worker
 
 
+def shape(question: dict[str, Any], _tell: Callable[[Any], None]) -> list[int]:
+    """Return the shape of a network's first input, usually (1, height, width, channels)."""
+    sizes: list[int] = _load(question["model"]).get_input_details()[0]["shape"].tolist()
+    return sizes
+
+
 def run(question: dict[str, Any], _tell: Callable[[Any], None]) -> dict[str, Any]:
     """Write the outputs of a network for each item of a batch, stacked, by size."""
     folder, net, results = Path(question["folder"]), _load(question["model"]), []
     for item in worker.map_arrays(folder / "batch.npz")["batch"]:
-        net.setInput(np.ascontiguousarray(item.transpose(2, 0, 1)[None]))
-        outputs = net.forward(net.getUnconnectedOutLayersNames())
-        results.append(sorted((np.array(o) for o in outputs), key=lambda output: -output.size))
+        net.set_tensor(net.get_input_details()[0]["index"], item[None])
+        net.invoke()
+        outputs = [net.get_tensor(output["index"]) for output in net.get_output_details()]
+        results.append(sorted(outputs, key=lambda output: -output.size))
     stacked = [np.concatenate(outputs) for outputs in zip(*results, strict=True)]
     worker.write_arrays(folder / "outputs.npz", {str(i): o for i, o in enumerate(stacked)})
     return {}
@@ -31,12 +39,12 @@ def run(question: dict[str, Any], _tell: Callable[[Any], None]) -> dict[str, Any
 
 @cache
 def _load(model: str) -> Any:
-    """Load a file by OpenCV's classic engine: the new one of OpenCV 5 drops all outputs but one."""
-    import cv2
+    from ai_edge_litert.interpreter import Interpreter
 
-    engine = [cv2.dnn.ENGINE_CLASSIC] if hasattr(cv2.dnn, "ENGINE_CLASSIC") else []
-    return cv2.dnn.readNetFromTFLite(model, *engine)
+    net = Interpreter(model)
+    net.allocate_tensors()
+    return net
 
 
 if __name__ == "__main__":
-    worker.answer_questions({"run": run})
+    worker.answer_questions({"shape": shape, "run": run})

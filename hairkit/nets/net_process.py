@@ -1,9 +1,9 @@
 """The process that runs networks, seen from hairkit: started when needed, replaced when it dies.
 
-OpenCV 5.0 ends with a segmentation fault on some model files, so no model is loaded into hairkit's
-own process. A crash or a hang is one `ModelError`; the next call starts a new process. A process
-that somebody else killed, such as a system without memory, says nothing of the model: its work is
-given to another, once.
+Networks of TensorFlow Lite are run by LiteRT. A user's file may crash it, so no model is
+loaded into hairkit's own process. A crash or a hang is one `ModelError`; the next call starts a new
+process. A process that somebody else killed, such as a system without memory, says nothing of the
+model: its work is given to another, once.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import sys
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 from hairkit import worker
 from hairkit.arrays import Float32Array
@@ -20,9 +21,9 @@ from hairkit.child_process import ChildError, ChildProcess, Limits, call_folder
 from hairkit.errors import ModelError
 
 TIME_LIMIT_S = 60.0
-"""Seconds for one call, loading included; the slowest known model takes 0.05 s on one core."""
+"""Seconds for one call, loading included; the slowest known model takes 0.1 s a picture."""
 MEMORY_BYTES = 4 * 2**30
-"""Address space of the process, OpenCV's 1 GiB included: a bad model cannot take the machine's."""
+"""Address space of the process: a bad model cannot take the machine's."""
 COMMAND = (sys.executable, "-P", "-m", "hairkit.nets.net_child")
 """What is started."""
 
@@ -54,14 +55,25 @@ class NetProcess:
         with call_folder() as at:
             folder = Path(at)
             worker.write_arrays(folder / "batch.npz", {"batch": batch})
-            question = {"do": "run", "model": str(Path(model).resolve()), "folder": at}
-            try:
-                answer = self._child.ask_twice(question, self._limits)
-            except ChildError as error:
-                raise ModelError(f"{model}: OpenCV {error} on this network") from error
-            if "error" in answer:
-                raise ModelError(f"{model}: OpenCV cannot run this network: {answer['error']}")
+            self._ask(model, {"do": "run", "folder": at})
             return tuple(worker.map_arrays(folder / "outputs.npz").values())
+
+    def input_shape(self, model: str | os.PathLike[str]) -> tuple[int, ...]:
+        """Return the shape of a network's first input, usually (1, height, width, channels).
+
+        Raises `ModelError` as `run` does.
+        """
+        return tuple(self._ask(model, {"do": "shape"}))
+
+    def _ask(self, model: str | os.PathLike[str], question: dict[str, Any]) -> Any:
+        question["model"] = str(Path(model).resolve())
+        try:
+            answer = self._child.ask_twice(question, self._limits)
+        except ChildError as error:
+            raise ModelError(f"{model}: LiteRT {error} on this network") from error
+        if "error" in answer:
+            raise ModelError(f"{model}: LiteRT cannot run this network: {answer['error']}")
+        return answer["result"]
 
     def close(self) -> None:
         """End the process; the next call starts another."""

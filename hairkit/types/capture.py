@@ -156,9 +156,6 @@ class View:
         if turns == 0:
             return self
         width, height = self.width, self.height
-        person = self.person
-        if person is not None and person.alpha.size:
-            person = Person(np.rot90(person.alpha, -turns))
         given, head = self.landmarks, self.head
         if head is not None:
             x, y = turn_points(np.array([head]), turns, *self.photo_size)[0].tolist()
@@ -172,7 +169,7 @@ class View:
             head=head,
             quarter_turns=(self.quarter_turns + turns) % 4,
             face=None if self.face is None else self.face.turned(turns, width, height),
-            person=person,
+            person=None if self.person is None else self.person.turned(turns),
         )
 
 

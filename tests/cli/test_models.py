@@ -28,7 +28,7 @@ def test_the_list_says_what_is_installed_and_under_which_licence(
     for model, line in zip(KNOWN_MODELS, lines[1:], strict=True):
         assert line.split()[:2] == [model.name, "-"]
         assert model.licence in line
-        assert model.wheel.requirement in line
+        assert model.package.requirement in line
     assert main(["models", "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
     assert [fact["installed"] for fact in facts] == [False] * len(KNOWN_MODELS)

@@ -10,8 +10,9 @@ import pytest
 
 from hairkit.imaging import hair_network
 from hairkit.imaging.hair_features import CHANNELS, GRID, hair_features
-from hairkit.imaging.hair_network import find_hair, hair_probability
+from hairkit.imaging.hair_network import LEAST_ODDS, find_hair, hair_probability
 from hairkit.types.capture import View
+from hairkit.types.person import Person
 
 
 def photo(height: int = 160, width: int = 120) -> np.ndarray:
@@ -41,13 +42,24 @@ def test_probabilities_add_up_to_one(size: tuple[int, int]) -> None:
 def test_a_mirrored_photo_has_the_mirrored_probability() -> None:
     """With the face and the person mirrored too; sums are made in another order."""
     image, centre = photo(128, 128), (70.0, 60.0)
-    person = np.random.default_rng(1).random((128, 128)).astype(np.float32)
+    alpha = np.random.default_rng(1).integers(0, 256, (128, 128), np.uint8)
+    person = Person(alpha, alpha // 2)
     landmarks = ring(centre, 20.0)
     first = hair_probability(image, person, landmarks)
     mirrored = landmarks * (-1, 1) + (128, 0)
     flip = np.ascontiguousarray
-    second = hair_probability(flip(image[:, ::-1]), flip(person[:, ::-1]), mirrored)
+    second = hair_probability(flip(image[:, ::-1]), person.part(np.s_[:, ::-1]), mirrored)
     assert np.allclose(first, second[:, ::-1], atol=0.05)
+
+
+def test_two_networks_are_multiplied() -> None:
+    """What the person's network says of a class multiplies its odds; it is never quite sure."""
+    image, alpha = photo(128, 128), np.full((128, 128), 200, np.uint8)
+    alone = hair_probability(image, Person(alpha), None)
+    both = hair_probability(image, Person(alpha, np.full_like(alpha, 200)), None)
+    odds = alone * np.float32([200 / 255, LEAST_ODDS, 55 / 255])
+    assert np.allclose(both, odds / odds.sum(axis=-1, keepdims=True), atol=1e-4)
+    assert both[..., 0].mean() > alone[..., 0].mean()
 
 
 def test_cells_off_the_photo_are_empty() -> None:

