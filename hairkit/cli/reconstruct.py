@@ -20,11 +20,11 @@ _DESCRIPTION = """\
 Example: hairkit reconstruct photos/ -o out/
 
 Turn photos of a head into a groom. PHOTOS is a folder with up to 36 photos taken around the head,
-in any order and direction, or one photo, from which unseen hair is continued; or a folder with photos/
-and, where present, masks/, strokes/ and landmarks.json, matched by name, and a capture.toml; or a
-video of one turn. OUT gets groom.npz, scene.json, the recipe's exports, contact_sheet.png, run.json
-(what was done, and how good it is) and hairkit.log. After an interruption, run it again: it
-continues where it stopped.
+in any order and direction, or one photo, from which unseen hair is continued; or a folder with
+photos/ and, where present, masks/, strokes/ and landmarks.json, matched by name, and a
+capture.toml; or a video of one turn. OUT gets groom.npz, scene.json, the recipe's exports,
+contact_sheet.png, run.json (what was done, and how good it is) and hairkit.log. After an
+interruption, run it again: it continues where it stopped.
 """
 GUIDES = 600
 """Roots by default, as of `hairkit.reconstruct`."""
