@@ -31,6 +31,10 @@ NEAR_BEARING = 4.0
 """
 MIRRORED = 0.05
 """Weight of a mirrored outline: it decides only where no other is near."""
+HANGS = 0.499
+"""Share of the outlines, by nearness, that have hair at a height from which there is some: hair of
+one side only reaches to the middle of the back.
+"""
 SMOOTH = 0.008
 """Standard deviation along the height over which outlines are smoothed, metres."""
 LYING = 0.015
@@ -229,4 +233,4 @@ def _between(
     below = _heights() < CHIN
     hung = thick[:, ~below & (_heights() < 0)].max(axis=1, keepdims=True)
     thick[:, below] = np.minimum(thick[:, below], hung)
-    return thick, np.asarray((shown > 0) & (shown >= 0.499 * total))
+    return thick, np.asarray((shown > 0) & (shown >= HANGS * total))
