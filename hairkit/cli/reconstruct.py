@@ -19,11 +19,12 @@ if TYPE_CHECKING:
 _DESCRIPTION = """\
 Example: hairkit reconstruct photos/ -o out/
 
-Turn photos of a head into a groom. PHOTOS is a folder with 3 to 36 photos taken around the head, in
-any order and direction; or a folder with photos/ and, where present, masks/, strokes/ and
-landmarks.json, matched by name, and a capture.toml; or a video of one turn. OUT gets groom.npz,
-scene.json, the recipe's exports, contact_sheet.png, run.json (what was done, and how good it is)
-and hairkit.log. After an interruption, run it again: it continues where it stopped.
+Turn photos of a head into a groom. PHOTOS is a folder with up to 36 photos taken around the head,
+in any order and direction, or one photo, from which unseen hair is continued; or a folder with
+photos/ and, where present, masks/, strokes/ and landmarks.json, matched by name, and a
+capture.toml; or a video of one turn. OUT gets groom.npz, scene.json, the recipe's exports,
+contact_sheet.png, run.json (what was done, and how good it is) and hairkit.log. After an
+interruption, run it again: it continues where it stopped.
 """
 GUIDES = 600
 """Roots by default, as of `hairkit.reconstruct`."""
@@ -42,7 +43,7 @@ def register(subparsers: Any) -> None:
         description=_DESCRIPTION,
     )
     add = parser.add_argument
-    add("photos", nargs="?", metavar="PHOTOS", help="folder of the photos, a video, or a name")
+    add("photos", nargs="?", metavar="PHOTOS", help="folder of photos, a photo, a video, or a name")
     add("-o", "--out", required=True, metavar="OUT", help="output folder")
     add("--sample", action="store_true", help="use the capture that ships with hairkit")
     recipes = f"{', '.join(recipe_names())} or a .toml file"

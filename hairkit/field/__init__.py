@@ -16,6 +16,7 @@ What field and tracking plugins share: fusing views, priors, diffusion, and samp
 * `scalp_sight`: directions of the hair on the scalp, as all views see them
 * `smooth_volume`: Gaussian smoothing of volumes
 * `symmetric_eigen`: eigenvectors of symmetric 3x3 tensors, in closed form
+* `unseen`: directions of hair that photos see from one side, or not at all
 * `view_fusion`: 2D orientations of all views fused into 3D tensors
 * `wisps`: single locks off the rest of the hair, thinner than the opened masks hold
 """

@@ -159,7 +159,9 @@ def add_scalp_prior(
     """Add the prior to tensors (N, 6) and certainty (N,) of the loose cells; return new ones."""
     data, weight = tensor.copy(), certainty.copy()
     if prior.weight:
-        _mix(data, weight, comb.near, comb.direction, np.full(len(comb.direction), prior.weight))
+        mix_directions(
+            data, weight, comb.near, comb.direction, np.full(len(comb.direction), prior.weight)
+        )
     if prior.crown and parts(parting, hair_length):
         share = prior.crown * crown_share(parting, head, hull.grid.centres_of(hull.loose))
         top, cells = share > 0, np.zeros(hull.grid.shape, bool)
@@ -168,11 +170,11 @@ def add_scalp_prior(
         outward = _unit(cell_slopes(hull.head_distance, cells))
         lift = root_lift(hull, points)[:, None]
         direction = comb_from_parting(parting, head, points, outward) + lift * outward
-        _mix(data, weight, top, _unit(direction), share[top])
+        mix_directions(data, weight, top, _unit(direction), share[top])
     return data, weight
 
 
-def _mix(
+def mix_directions(
     data: Float32Array,
     weight: Float32Array,
     cells: BoolArray,

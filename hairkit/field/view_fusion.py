@@ -21,6 +21,7 @@ from hairkit.cameras.depth_raster import SPLAT_CELLS, splat_depth
 from hairkit.cameras.projection_kernels import PackedCamera, Vector, pack_camera, project
 from hairkit.field.cell_shells import erode_cells
 from hairkit.field.symmetric_eigen import smallest_eigenvectors
+from hairkit.field.unseen import add_surface_planes
 from hairkit.imaging.waves import remove_slant
 from hairkit.options import option
 from hairkit.parallel import compiled, parallel_for
@@ -87,8 +88,12 @@ def fuse_views(
     waves: Waves,
     options: FusionOptions,
     min_views: int = 1,
+    surface: float = 0.0,
 ) -> FusedViews:
-    """Return the directions of all loose cells, waves measured and taken into account."""
+    """Return the directions of all loose cells, waves measured and taken into account.
+
+    Photos of one side leave the slope in depth to the hull's surface, by a share in [0, 1].
+    """
     maps = tuple(orientations)
     if options.unslant:
         maps = tuple(remove_slant(found, waves) for found in orientations)
@@ -96,6 +101,8 @@ def fuse_views(
     fading = Fading(float(options.see_through), float(options.free_depth))
     planes, views = fuse_planes(cameras, masks, maps, fronts, hull, fading)
     planes = pool_planes(planes, hull, options.pool * waves.pitch)
+    if surface > 0:
+        planes = add_surface_planes(planes, hull, surface)
     return FusedViews(maps, fronts, *plane_directions(planes, views, min_views))
 
 

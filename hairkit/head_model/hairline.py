@@ -31,6 +31,9 @@ SKIN_BLUR = 0.005
 """Metres over which the votes of neighbouring vertices are averaged."""
 NEIGHBOURS = 24
 """Vertices averaged; the template's are 3 mm apart."""
+UNSEEN_REACH = 0.015
+"""Metres to which votes carry where photos leave more than half of the head unseen: hair is cut
+short, not bald, behind a bare neck."""
 PRIOR = 0.05
 """Weight of the belief that hair grows, in views that see a vertex straight on."""
 FULL, BARE = 0.25, 0.5
@@ -49,7 +52,7 @@ def measure_hairline(scene: Scene, masks: Sequence[Mask]) -> Hairline:
         sees = _facing(small, scene, vertices, normals)
         against += sees * (1 - _hair_at(small, mask, vertices))
         weight += sees
-    against = _average(vertices, against, weight)
+    against = _average(vertices, against, weight, UNSEEN_REACH if scene.one_sided else np.inf)
     return Hairline(np.clip((BARE - against) / (BARE - FULL), 0, 1).astype(np.float32))
 
 
@@ -75,8 +78,13 @@ def _hair_at(camera: Camera, mask: Mask, vertices: Float64Array) -> Float64Array
     return share
 
 
-def _average(vertices: Float64Array, against: Float64Array, weight: Float64Array) -> Float64Array:
-    """Return (V,) the share of votes against hair, averaged over the nearest vertices seen."""
+def _average(
+    vertices: Float64Array, against: Float64Array, weight: Float64Array, reach: float
+) -> Float64Array:
+    """Return (V,) the share of votes against hair, averaged over the nearest vertices seen.
+
+    Votes fade with the distance of the nearest, over `reach` metres.
+    """
     seen = np.flatnonzero(weight > 0)
     if not len(seen):
         return np.zeros(len(vertices))
@@ -84,6 +92,7 @@ def _average(vertices: Float64Array, against: Float64Array, weight: Float64Array
     distance, near = cKDTree(vertices[seen]).query(vertices, k=count)
     distance, near = distance.reshape(-1, count), seen[near.reshape(-1, count)]
     close = np.exp((distance[:, :1] ** 2 - distance**2) / (2 * SKIN_BLUR**2))
+    close *= np.exp(-((distance[:, :1] / reach) ** 2))
     total = (close * weight[near]).sum(axis=1) + PRIOR
     result: Float64Array = (close * against[near]).sum(axis=1) / total
     return result

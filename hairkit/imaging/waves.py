@@ -61,8 +61,8 @@ SLOPE_PATCH, SLOPE_STEP = (0.048, 0.048), 0.012
 """Height, width and spacing of the patches, wholly hair, for the spectrum, metres."""
 BAND = (150.0, 350.0)
 """Cycles per metre: 3 to 7 mm, coarser than the lattice of pixels, finer than locks."""
-FEWEST_PATCHES = 12
-"""Patches of all views below which nothing is measured."""
+FEWEST_PATCHES, FEWEST_EACH = 12, 4
+"""Patches of all views below which nothing is measured, and of each where they are one or two."""
 FEWEST_OF_A_VIEW = 2
 """Patches of one view that tell a pitch of its own."""
 SAME_PITCH, LEAST_AGREEMENT = 0.15, 0.6
@@ -118,8 +118,9 @@ def measure_waves(
     views = [_normalise(*view) for view in scaled if view is not None]
     if _are_coils(views):
         return COILS
-    pitch, prominence = _measure_pitch(views)
-    moments = _angular_moments(views) if prominence >= LEAST_PROMINENCE else None
+    fewest = min(FEWEST_PATCHES, FEWEST_EACH * len(cameras))
+    pitch, prominence = _measure_pitch(views, fewest)
+    moments = _angular_moments(views, fewest) if prominence >= LEAST_PROMINENCE else None
     slope = 0.0 if moments is None else _fit_slope(*moments)
     short = scalp_distance is not None and scalp_distance.hair_length < LEAST_TURNS * pitch
     if slope < LEAST_SLOPE or short:
@@ -210,10 +211,12 @@ class _Repeats(NamedTuple):
     patches: int
 
 
-def _measure_pitch(views: Sequence[tuple[Float32Array, Float32Array]]) -> tuple[float, float]:
+def _measure_pitch(
+    views: Sequence[tuple[Float32Array, Float32Array]], fewest: int = FEWEST_PATCHES
+) -> tuple[float, float]:
     """Return the pitch in metres and its prominence, both 0 where views show no pitch together."""
     found = [_sum_patches(view) for view in views]
-    pitch, prominence = _peak(_together(found), FEWEST_PATCHES)
+    pitch, prominence = _peak(_together(found), fewest)
     alone = [_peak(each, FEWEST_OF_A_VIEW) for each in found]
     told = np.array([own for own, sure in alone if sure >= LEAST_PROMINENCE])
     same = np.abs(told / max(pitch, SHORTEST_PITCH) - 1) <= SAME_PITCH
@@ -294,7 +297,7 @@ def _first_peak(profile: Float64Array) -> tuple[float, float]:
 
 
 def _angular_moments(
-    views: Sequence[tuple[Float32Array, Float32Array]],
+    views: Sequence[tuple[Float32Array, Float32Array]], fewest: int = FEWEST_PATCHES
 ) -> tuple[float, float] | None:
     """Return the means of cos 2 phi and cos 4 phi over the power; phi is off the vertical."""
     size, count = round(SLOPE_PATCH[0] * RESOLUTION), 0
@@ -303,7 +306,7 @@ def _angular_moments(
     for picture, _ in _patches(views, SLOPE_PATCH, SLOPE_STEP, 1.0):
         power += np.abs(fft.fft2((picture - picture.mean()) * taper)) ** 2
         count += 1
-    if count < FEWEST_PATCHES:
+    if count < fewest:
         return None
     angle = np.arange(_ANGLES) * np.pi / _ANGLES  # of the wave vector, so of the strand off upright
     frequency = np.linspace(*BAND, _RADII)[:, None] * size / RESOLUTION

@@ -52,8 +52,9 @@ TOP_DEG = 60.0
 NAMES = (*TURN, "top")
 """Names by which photos tell what they show."""
 
-FEWEST, MOST = 3, 36
-"""Numbers of photos: three go around a head, and more than one every 10 degrees add nothing."""
+FEWEST, MOST = 1, 36
+"""Numbers of photos: one is continued to where it shows nothing, and more than one every 10 degrees
+add nothing."""
 
 WORKING_EDGE = 1440
 """Long edge in pixels that photos are scaled down to."""
@@ -85,7 +86,7 @@ def read_capture(path: str | os.PathLike[str], max_edge: int = WORKING_EDGE) -> 
     Parameters
     ----------
     path
-        The capture's folder, or a video of a turn, see `read_video`.
+        The capture's folder, one photo, or a video of a turn, see `read_video`.
         Photos without names of views are an even turn in file order until the stage `turn` finds
         out from where they were taken.
     max_edge
@@ -94,8 +95,8 @@ def read_capture(path: str | os.PathLike[str], max_edge: int = WORKING_EDGE) -> 
     Raises
     ------
     InputError
-        There are fewer than 3 or more than 36 photos, one cannot be read, or masks, strokes or
-        landmarks do not belong to the photos.
+        There are no photos or more than 36, one cannot be read, or masks, strokes or landmarks do
+        not belong to the photos.
     """
     if is_video(Path(path)):
         return read_video(Path(path), max_edge)
@@ -103,11 +104,15 @@ def read_capture(path: str | os.PathLike[str], max_edge: int = WORKING_EDGE) -> 
 
 
 def read_folder(path: str | os.PathLike[str], max_edge: int = WORKING_EDGE) -> Capture:
-    """Return the capture in a folder, as `read_capture`."""
+    """Return the capture in a folder, or that of one photo, as `read_capture`."""
     folder = Path(path)
+    if folder.is_file():
+        alone = CaptureFile(folder)
+        (place,) = _places(_check_kinds([folder]), alone, folder.parent)
+        one = _view(place, alone, max_edge, None, None, None)
+        return Capture((one,), source=folder, max_edge=max_edge)
     if not folder.is_dir():
-        reason = "not a folder" if folder.exists() else "no such folder"
-        raise InputError(f"{folder}: {reason}, expected a folder of photos")
+        raise InputError(f"{folder}: no such file, expected a photo or a folder of photos")
     photo_folder = folder / "photos" if (folder / "photos").is_dir() else folder
     settings = read_capture_file(folder / "capture.toml")
     photos = _photos(photo_folder)
@@ -156,8 +161,13 @@ def photo_files(folder: Path) -> list[Path]:
     names = [entry for entry in folder.iterdir() if not entry.name.startswith(".")]
     pictures = [p for p in names if p.suffix.lower() in _PHOTO_SUFFIXES + _OTHER_SUFFIXES]
     pictures.sort(key=lambda p: [int(s) if s.isdigit() else s for s in _digits(p.name.lower())])
+    return _check_kinds(pictures)
+
+
+def _check_kinds(pictures: list[Path]) -> list[Path]:
+    """Return the photos; `InputError` for files of other kinds."""
     for picture in pictures:
-        if picture.suffix.lower() in _OTHER_SUFFIXES:
+        if picture.suffix.lower() not in _PHOTO_SUFFIXES:
             raise InputError(f"{picture}: expected {PHOTOS_TAKEN}; save it as one of these")
     return pictures
 
@@ -167,8 +177,8 @@ def _photos(photo_folder: Path) -> list[Path]:
     pictures = photo_files(photo_folder)
     if not FEWEST <= len(pictures) <= MOST:
         raise InputError(
-            f"{photo_folder}: {len(pictures)} photos, expected {FEWEST} to {MOST} from all around"
-            f" the head; {len(TURN)}, 45 degrees apart, are usual"
+            f"{photo_folder}: {len(pictures)} photos, expected {FEWEST} to {MOST};"
+            f" {len(TURN)} from all around the head, 45 degrees apart, are usual"
         )
     return pictures
 

@@ -16,6 +16,7 @@ from hairkit.cameras.similarity import move_head
 from hairkit.field.find_parting import measure_parting
 from hairkit.field.find_ties import measure_ties
 from hairkit.field.growth_prior import measure_scalp_distance
+from hairkit.field.unseen import group_seen
 from hairkit.grooming.assemble import assemble_groom
 from hairkit.head_model.hairline import measure_hairline
 from hairkit.head_model.photo_skin import photograph_skin
@@ -282,17 +283,15 @@ class Findings:
     @result_of(TEXTURE)
     def texture(self) -> Given[Texture]:
         """The albedo of the skin, enhanced."""
-        skin = self.photographed
-        albedo = Given(skin.value.albedo, skin.digest)
+        albedo = Given(self.photographed.value.albedo, self.photographed.digest)
         return self.run.once(TEXTURE, texture=albedo, example=Given.of(None))
 
     @found
     def skin(self) -> SkinMaps:
         """The skin, enhanced where the recipe says so."""
         skin = self.photographed.value
-        if skin.albedo is None or not self.run.recipe.has(TEXTURE):
-            return skin
-        return replace(skin, albedo=self.texture.value)
+        bare = skin.albedo is None or not self.run.recipe.has(TEXTURE)
+        return skin if bare else replace(skin, albedo=self.texture.value)
 
     @result_of(HULL)
     def hull(self) -> Given[Hull]:
@@ -380,7 +379,8 @@ class Findings:
         evidence, strands = self.evidence.value, self.strands.value
         return assemble_groom(
             self.capture.views, evidence.masks, replace(self.grown_head, maps=skin.result()),
-            self.roots.value, strands, evidence.waves, evidence.tied, self.capture.chosen.hair,
+            self.roots.value, group_seen(strands, evidence), evidence.waves, evidence.tied,
+            self.capture.chosen.hair,
         )  # fmt: skip
 
     def _solve(
@@ -389,7 +389,7 @@ class Findings:
         masks: Given[tuple[Mask, ...]],
         start: Given[Scene] | None = None,
     ) -> Given[Scene]:
-        begin: Given[Any] = Given.of(None) if start is None else start
+        begin: Any = Given.of(None) if start is None else start
         return self.run.once(stage, capture=self.plain, masks=masks, head=self.rest, start=begin)
 
 

@@ -26,6 +26,7 @@ from hairkit.types.head import JAW_LANDMARKS, Head
 from hairkit.types.mask import HAIR, PERSON, Mask
 from hairkit.types.parting import Parting
 from hairkit.types.scene import Scene
+from hairkit.types.strands import SEEN, Strands
 from hairkit.types.tie import Tie, TiedHair
 from hairkit.types.turnaround import Turnaround
 from hairkit.types.volume import Hull
@@ -120,7 +121,7 @@ def assess(
     hair_length = evidence.scalp_distance.hair_length
     level = hair_length < PARTED_HAIR or evidence.tied.tails or evidence.waves.coiled
     return (
-        *assess_turn(turn),
+        *assess_turn(None if scene.one_sided else turn),
         *assess_landmarks(capture, scene),
         *assess_cameras(scene),
         *assess_masks(masks, scene),
@@ -128,6 +129,7 @@ def assess(
         *assess_orientations(capture, evidence),
         *(() if level else assess_parting(evidence.parting)),
         *assess_ties(evidence.tied, scene.head),
+        *(assess_seen(groom.strands) if scene.one_sided else ()),
         *assess_strands(groom, roots, hair_length),
         *assess_drawing(capture, masks, scene, groom),
     )
@@ -169,9 +171,10 @@ def assess_landmarks(capture: Capture, scene: Scene) -> tuple[Figure, ...]:
         (v, c) for v, c in zip(capture.views, scene.cameras, strict=True) if v.landmarks is not None
     ]
     count = len(known)
+    light = GREEN if count == len(capture.views) else LANDMARK_VIEWS.light(count)
     figures = [
         Figure(
-            "landmarks", "views used", count, "", LANDMARK_VIEWS.light(count),
+            "landmarks", "views used", count, "", light,
             "no face was found, so the size of the head is a guess; give landmarks.json", 0,
         )
     ]  # fmt: skip
@@ -188,8 +191,7 @@ def assess_landmarks(capture: Capture, scene: Scene) -> tuple[Figure, ...]:
                 f"look at {_label(known[worst][0])}", 1,
             )
         )  # fmt: skip
-    left, right = (points[eye].mean(axis=0) for eye in EYES)
-    pupils = 1000 * float(np.linalg.norm(left - right))
+    pupils = 1000 * float(np.linalg.norm(np.subtract(*(points[e].mean(axis=0) for e in EYES))))
     light = PUPIL_MM.light(abs(pupils - ADULT_PUPILS_MM))
     note = "not an adult's: lengths in metres are off by as much"
     return (*figures, Figure("head", "distance of the pupils", pupils, "mm", light, note, 1))
@@ -199,8 +201,7 @@ def assess_cameras(scene: Scene) -> tuple[Figure, ...]:
     """Return the misfit of the outlines, in millimetres at the head and in pixels."""
     if scene.residual_px is None:
         return ()
-    scale = float(np.mean([camera.pixels_per_metre for camera in scene.cameras]))
-    off = 1000 * scene.residual_px / scale
+    off = 1000 * scene.residual_px / np.mean([c.pixels_per_metre for c in scene.cameras]).item()
     note = f"{scene.residual_px:.1f} px; are all photos of one head, in the order of the turn?"
     return (Figure("cameras", "outlines off by", off, "mm", OUTLINE_MM.light(off), note, 1),)
 
@@ -323,6 +324,13 @@ def describe_tie(tie: Tie, head: Head) -> str:
     return f"{tie.kind} {where} the {side}, {above:.0f} cm above the nape"
 
 
+def assess_seen(strands: Strands) -> tuple[Figure, ...]:
+    """Return the share of the strands that a photo shows, of photos of one side."""
+    share = float(np.mean(strands.group == SEEN))
+    note = "group 1 is made up from the outline and what is seen; add photos of the other sides"
+    return (Figure("strands", "seen in a photo", share, "", AMBER, note),)
+
+
 def assess_strands(groom: Groom, roots: int, hair_length: float) -> tuple[Figure, ...]:
     """Return the share of roots that grew, the strands' length and the radius of their curls."""
     strands, radius = groom.strands, 1000 * groom.material.curl_radius
@@ -388,8 +396,7 @@ def _misfit_mm(camera: Camera, points: Float64Array, seen: Float64Array | None) 
     """Return the root mean square distance of the inner landmarks from those seen, at the head."""
     assert seen is not None
     gap = (camera.project(points) - seen)[JAW_LANDMARKS:]
-    rms = float(np.sqrt((gap**2).sum(axis=1).mean()))
-    return 1000 * rms / camera.pixels_per_metre
+    return 1000 * float(np.sqrt((gap**2).sum(axis=1).mean())) / camera.pixels_per_metre
 
 
 def _hairy_share(mask: Mask, camera: Camera, points: Float32Array) -> float:

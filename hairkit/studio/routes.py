@@ -303,7 +303,7 @@ class Routes:
 
     async def _build(self, request: Request) -> Response:
         if not self._studio.project.enough:
-            raise HTTPException(HTTPStatus.CONFLICT, "three photos are the least")
+            raise HTTPException(HTTPStatus.CONFLICT, "add a photo first")
         self._studio.changed(ask=True)
         return JSONResponse({}, HTTPStatus.ACCEPTED)
 

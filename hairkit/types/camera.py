@@ -157,6 +157,18 @@ class Camera(Stored):
             self, focal=self.focal * scale, centre=self.centre * size, width=width, height=height
         )
 
+    def mirrored(self) -> Camera:
+        """Return the camera that sees what is mirrored at the plane x = 0 in the mirrored picture.
+
+        >>> camera = Camera.on_turn(0.5, distance=1.0, focal=1000.0, width=800, height=600)
+        >>> x, y = camera.project([0.1, 0.05, 0.0])
+        >>> bool(np.allclose(camera.mirrored().project([-0.1, 0.05, 0.0]), [800 - x, y]))
+        True
+        """
+        flip = np.diag([-1.0, 1.0, 1.0, 1.0])
+        centre = np.array([self.width - self.centre[0], self.centre[1]])
+        return replace(self, camera_from_head=flip @ self.camera_from_head @ flip, centre=centre)
+
     def on_photo(self, frame: Sequence[int], size: tuple[int, int]) -> Camera:
         """Return the camera of a whole photo of `size` whose part `frame` this one's picture is.
 

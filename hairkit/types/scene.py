@@ -17,6 +17,9 @@ from hairkit.types.camera import Camera
 from hairkit.types.head import Head
 from hairkit.types.preview import PHOTO_HEIGHT, Previewed, draw_view, row
 
+WHOLE_TURN, ONE_SIDE_DEG = 3, 200.0
+"""Fewest views that go around a head, and the largest step between them from which they do not."""
+
 
 @dataclass(frozen=True, eq=False)
 class Scene(Previewed, Stored):
@@ -41,6 +44,13 @@ class Scene(Previewed, Stored):
         misfit = "" if self.residual_px is None else f", residual {self.residual_px:.2f} px"
         head = len(self.head.vertices)
         return f"Scene({len(self.cameras)} cameras, head of {head} vertices{misfit})"
+
+    @property
+    def one_sided(self) -> bool:
+        """Whether the views leave more than half of the head unseen: one, two, or all of a side."""
+        around = np.sort([camera.azimuth_deg % 360.0 for camera in self.cameras])
+        steps = np.diff(around, append=around[0] + 360.0)
+        return len(self.cameras) < WHOLE_TURN or bool(steps.max() > ONE_SIDE_DEG)
 
     def resized(self, sizes: Sequence[tuple[int, int]]) -> Self:
         """Return the scene with cameras for pictures of other sizes (width, height)."""

@@ -23,6 +23,10 @@ from hairkit.errors import DataError
 from hairkit.storage import Stored
 from hairkit.types.preview import Previewed, draw_turn
 
+SEEN, CONTINUED = 0, 1
+"""Groups of strands that photos show, and of those continued from them where photos show one side
+of the head only. Photos from all around make one group."""
+
 
 @dataclass(frozen=True, eq=False)
 class Strands(Previewed, Stored):

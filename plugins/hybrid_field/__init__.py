@@ -47,8 +47,10 @@ from hairkit.field.growth_prior import (
     add_scalp_prior,
     comb_cells,
     growth_potential,
+    long_share,
 )
 from hairkit.field.hanging_hair import hang_curls, stand_coils
+from hairkit.field.unseen import add_flow
 from hairkit.field.view_fusion import fuse_views
 from hairkit.parallel import thread_count
 
@@ -87,7 +89,9 @@ def solve_field(
         return hang_curls(scene.head, hull, growth)
     length = scalp_distance.hair_length
     way = Way(growth, scene.head, parting, length)
-    fused = fuse_views(scene.cameras, masks, orientations, hull, waves, options)
+    part = scene.one_sided
+    surface = part * long_share(length)  # short hair stands off, and its ends make the surface
+    fused = fuse_views(scene.cameras, masks, orientations, hull, waves, options, surface=surface)
     if options.segments is None:
         segments = find_segments(scene.cameras, masks, fused, hull, way, options)
     else:
@@ -96,15 +100,15 @@ def solve_field(
     band = ribbons(segments, hull, options.ribbon)
     comb = comb_cells(scene.head, hull, growth, parting, length)
     prior = ScalpPrior(options.scalp_weight, options.parting_weight)
-    wanted, weight = add_scalp_prior(
-        scene.head, hull, fused.tensor, fused.certainty, comb, prior, parting, length
-    )
+    seen = fused.tensor, fused.certainty
+    seen = add_flow(hull, growth, *seen) if part else seen
+    wanted, weight = add_scalp_prior(scene.head, hull, *seen, comb, prior, parting, length)
     cells = CellGraph.of(hull.loose)
     with ThreadPoolExecutor(thread_count()) as pool:
         parts = (
             pool.submit(surface_structure, cells, band, options.tolerance),
             pool.submit(internal_direction, cells, wanted, weight, band, options),
-            pool.submit(internal_distance, hull, segments, options.tolerance),
+            pool.submit(internal_distance, hull, segments, options.tolerance, part),
             pool.submit(growth_direction, cells, band, comb, options.tolerance),
         )
         fields = Fields(*(part.result() for part in parts))

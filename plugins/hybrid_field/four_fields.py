@@ -75,19 +75,21 @@ def internal_direction(
     return solve_screened(cells, data, total, SMOOTHNESS, tolerance=options.tolerance)
 
 
-def internal_distance(hull: Hull, segments: Strands, tolerance: float) -> Float32Array:
+def internal_distance(
+    hull: Hull, segments: Strands, tolerance: float, one_sided: bool = False
+) -> Float32Array:
     """Return I (X, Y, Z): 0 in the head, 1 on strands, harmonic up to the grid's border.
 
     The border's value is 1 plus the distance to the nearest strand in `UNIT`. Solved on cells
-    `COARSE` times as large.
+    `COARSE` times as large. The hull's surface is 1, too, where photos are `one_sided`.
     """
     shape = tuple(-(-n // COARSE) for n in hull.grid.shape)
     strand = np.zeros(shape, bool)
     if len(segments):
         cells = hull.grid.nearest_cell(segments.points) // COARSE
         strand[tuple(cells.T)] = True
-    if not strand.any():
-        strand = _pool(hull.dense & ~erode_cells(hull.dense), shape)
+    if one_sided or not strand.any():
+        strand |= _pool(hull.dense & ~erode_cells(hull.dense), shape)
     away = ndimage.distance_transform_edt(~strand) * (COARSE * hull.grid.spacing / UNIT)
     border = np.ones(shape, bool)
     border[1:-1, 1:-1, 1:-1] = False

@@ -6,6 +6,8 @@ views mirror each other and those of neighbours are alike, the share of skin fal
 the back, and steps are even rather than not. A photo without which the rest is a better turn is one
 from above. Where several arrangements fit nearly alike, all are handed on: their cameras tell.
 Frames of a video are in the order of time. What is no turn around one head is refused in one line.
+One or two photos, and more of which none shows the back, are no turn: their azimuths are those of
+their faces, and photos without a face are from the side on which they show the skin.
 
 * `appearance`: outlines, skin, copies
 * `arrangement`: how well photos fit azimuths
@@ -25,8 +27,8 @@ import numpy as np
 
 from hairkit import Capture, View, hookimpl
 from hairkit.arrays import BoolArray, Float64Array, Int64Array
+from hairkit.errors import InputError
 from hairkit.imaging.person_outline import Outline, trace_outline
-from hairkit.io.capture_reader import FEWEST
 from hairkit.io.photos import focal_from_equivalent
 from hairkit.io.video import SUFFIXES
 from hairkit.types.face import Face
@@ -34,9 +36,16 @@ from hairkit.types.person import Person
 from hairkit.types.turnaround import Turnaround
 
 from .appearance import compare_outlines, measure_clothes, measure_oddness, measure_skin
-from .arrangement import Evidence
+from .arrangement import SIDE_DEG, Evidence
 from .describe import Found, in_turn_order, name_views, summarise, tell_doubts
-from .refuse import check_one_person, check_turn, contradicting, find_copies
+from .refuse import (
+    SIDE_ONLY_DEG,
+    NoBackError,
+    check_one_person,
+    check_turn,
+    contradicting,
+    find_copies,
+)
 from .search import find_arrangements, margin_of
 
 ABOVE_DEG = 35.0
@@ -55,6 +64,8 @@ CERTAIN = 1.5
 margin above 1.25 ten were wrong before cameras were asked, of 101 with a smaller one 34."""
 MOST_HANDED_ON = 12
 """Arrangements that are handed on."""
+WHOLE_TURN = 3
+"""Photos that can go around a head; fewer are no turn."""
 NAMED_SPREAD = 1.0
 """Standard deviation of azimuths that the user names, degrees."""
 
@@ -114,8 +125,9 @@ def _find(views: Sequence[View], outlines: Sequence[Outline | None], in_time: bo
     named = np.array([view.named for view in views])
     none = np.zeros_like(named)
     read = Found(azimuth, elevation, elevation > ABOVE_DEG, np.inf, named, none)
-    yaw = Evidence.of(faces).yaw_deg
-    if not np.isfinite(yaw).any():
+    evidence = Evidence.of(faces)
+    yaw = evidence.yaw_deg
+    if not (few := _is_part(yaw, named)) and not np.isfinite(yaw).any():
         unchecked = "no face was found, nobody checked the order of the photos"
         return [read if named.all() else replace(read, margin=1.0, note=unchecked)]
     wrong = contradicting(yaw, np.where(named, azimuth, yaw))
@@ -123,7 +135,14 @@ def _find(views: Sequence[View], outlines: Sequence[Outline | None], in_time: bo
         return [read]
     if wrong is not None:
         named = np.zeros_like(named)
-    found = _arrange(views, _gather_evidence(views, outlines), named, in_time)
+    if few:
+        found = [_by_faces(views, evidence, replace(read, named=named))]
+    else:
+        seen = _gather_evidence(views, outlines)
+        try:
+            found = _arrange(views, seen, named, in_time)
+        except NoBackError:
+            found = [_by_faces(views, _with_profiles(seen), replace(read, named=named))]
     if wrong is not None:
         note = (
             f"{views[wrong].photo_name} is no view {views[wrong].name!r}, its face is turned by"
@@ -131,6 +150,38 @@ def _find(views: Sequence[View], outlines: Sequence[Outline | None], in_time: bo
         )
         found = [replace(each, note=note) for each in found]
     return found
+
+
+def _is_part(yaw_deg: Float64Array, named: BoolArray) -> bool:
+    """Return whether the photos are too few for a turn, or all are unnamed and show the face."""
+    return len(named) < WHOLE_TURN or bool(
+        not named.any() and (np.abs(yaw_deg) < SIDE_ONLY_DEG).all()
+    )
+
+
+def _with_profiles(seen: Evidence) -> Evidence:
+    """Return the evidence with the side from which photos without a face show the skin."""
+    if seen.skin is None:
+        return seen
+    bare = np.isnan(seen.yaw_deg) & (seen.side == 0)
+    return replace(seen, side=np.where(bare, -np.sign(np.nan_to_num(seen.skin[:, 1])), seen.side))
+
+
+def _by_faces(views: Sequence[View], evidence: Evidence, read: Found) -> Found:
+    """Return photos where their names or their faces say; `InputError` for one with neither."""
+    told = np.where(evidence.side != 0, SIDE_DEG * evidence.side, evidence.yaw_deg)
+    azimuth = np.where(read.named, read.azimuth_deg, told)
+    if not np.isfinite(azimuth).all():
+        photo = views[int(np.isnan(azimuth).argmax())].photo_name
+        raise InputError(
+            f"{photo}: no face is found, which tells from where a photo was taken;"
+            " call the file left, right or back if that is what it shows"
+        )
+    pitch = np.array([v.face.pitch_deg if v.face and v.face.sure else np.nan for v in views])
+    none = np.zeros_like(read.above)
+    pitch = np.where(read.named, read.elevation_deg, pitch)
+    level = _elevations(pitch, none, read.named, _level(views))
+    return replace(read, azimuth_deg=azimuth, elevation_deg=level, above=none)
 
 
 def _arrange(views: Sequence[View], seen: Evidence, named: BoolArray, in_time: bool) -> list[Found]:
@@ -176,7 +227,7 @@ def _gather_evidence(views: Sequence[View], outlines: Sequence[Outline | None]) 
     faces = [view.face or Face.absent() for view in views]
     rows = [i for i, outline in enumerate(outlines) if outline is not None]
     known = [outline for outline in outlines if outline is not None]
-    if len(known) < FEWEST:
+    if len(known) < WHOLE_TURN:
         return Evidence.of(faces)
     photos = [views[i].image for i in rows]
     check_one_person([views[i] for i in rows], measure_clothes(photos, known))

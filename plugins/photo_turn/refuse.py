@@ -21,6 +21,8 @@ to 0.81 in the median and by 0.98 at most; copies with other exposure, cropped b
 1. Whole photos of a person before a white wall correlate by 0.945 in the median."""
 BACK_DEG = 100.0
 """Some photo is taken from within this of the back."""
+SIDE_ONLY_DEG = 180.0 - BACK_DEG
+"""Azimuth of the photos that are not."""
 OFF_DEG, NAMED_OFF_DEG = 45.0, 50.0
 """Faces farther than this from where the turn, or a photo's name, has them contradict it."""
 FRONTAL_DEG = 50.0
@@ -38,6 +40,10 @@ and by the second times the spread within the groups plus the third. The ratio i
 turns, and 5.9 to 19 in 36 mixtures of two people in unlike clothes."""
 FEWEST_OF_ONE = 2
 """A group has at least so many photos: one alone may be badly lit."""
+
+
+class NoBackError(InputError):
+    """No photo shows the back of the head."""
 
 
 def find_copies(views: Sequence[View], outlines: Sequence[Outline | None]) -> list[tuple[int, int]]:
@@ -102,7 +108,7 @@ def _check_back(views: Sequence[View], placed: Placed) -> None:
     """Refuse photos that are all from the front."""
     ring = np.nonzero(~placed.above)[0]
     last = int(ring[np.abs(placed.azimuth_deg[ring]).argmax()])
-    if abs(placed.azimuth_deg[last]) < 180.0 - BACK_DEG:
+    if abs(placed.azimuth_deg[last]) < SIDE_ONLY_DEG:
         _refuse_back(views, last, f"at about {abs(placed.azimuth_deg[last]):.0f} degrees")
 
 
@@ -122,7 +128,7 @@ def _check_sides(
 
 
 def _refuse_back(views: Sequence[View], nearest: int, where: str) -> None:
-    raise InputError(
+    raise NoBackError(
         f"{views[nearest].photo_name}: of {len(views)} photos this is nearest to the back of the"
         f" head, and it is {where}; add photos from behind"
     )

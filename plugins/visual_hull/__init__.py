@@ -9,6 +9,7 @@ carved with opened masks, `loose` with the masks as they are. Cells that are emp
 `forgive` views are kept, which survives camera errors.
 
 * `carving`: votes of views on cells, compiled
+* `shell`: how far hair stands off the head where no photo shows it
 * `torso_fit`: a torso fitted to the outlines of clothes
 """
 
@@ -35,6 +36,7 @@ from hairkit.imaging.masked_filters import picture_scale
 from hairkit.options import option
 
 from .carving import EMPTY, HAIR, PERSON, LabelledView, Rule, carve
+from .shell import Shell
 from .torso_fit import fit_torso
 
 _log = logging.getLogger("hairkit.visual_hull")
@@ -55,6 +57,9 @@ SCALP_ROOM = 0.012
 """Metres about the scalp that the grid holds: its shell, and strands that leave the hull."""
 CLOTHES_SHRINK = 4
 """Depth maps of the person's hull are this much smaller than the pictures: cells are larger."""
+BEHIND_SKIN = 0.02
+"""Metres behind seen skin and clothes up to which a cell is empty where views show one side only:
+there cells are hair that no view sees."""
 LEAST_PART = 0.1
 """Parts of the hull with fewer cells than this share of the largest are dropped."""
 SHELL_CELLS = 2
@@ -116,9 +121,10 @@ def build_hull(scene: Scene, masks: tuple[Mask, ...], options: Options) -> Hull:
     views = _Views.of(scene, masks, options)
     torso = _torso(scene, masks, options)
     dressed = views if torso is None else views.in_front_of(torso)
-    grid = _grid_around_hair(scene, dressed, torso, options)
+    shell = Shell.of(scene, masks, torso) if views.mirrored else None
+    grid = _grid_around_hair(scene, dressed, torso, shell, options)
     distance = signed_distance(scene.head, grid)
-    outside, near = _room(grid, torso, options)
+    outside, near = _room(grid, torso, shell, options)
     if options.cut_head:
         outside &= distance > 0
     if torso is not None and grid.origin[1] < torso.top:
@@ -129,11 +135,14 @@ def build_hull(scene: Scene, masks: tuple[Mask, ...], options: Options) -> Hull:
     return Hull(grid, dense, loose | dense | scalp, distance, shape)
 
 
-def _room(grid: VoxelGrid, torso: Torso | None, options: Options) -> tuple[BoolArray, BoolArray]:
+def _room(
+    grid: VoxelGrid, torso: Torso | None, shell: Shell | None, options: Options
+) -> tuple[BoolArray, BoolArray]:
     """Return the cells (X, Y, Z) outside of the torso, and those near enough to the person."""
-    outside, near = np.ones(grid.shape, bool), np.ones(grid.shape, bool)
+    outside = np.ones(grid.shape, bool) if shell is None else shell.inside(grid)
+    near = np.ones(grid.shape, bool)
     if torso is not None and grid.origin[1] < torso.top:
-        outside = ~torso.inside(grid, options.body_depth)
+        outside &= ~torso.inside(grid, options.body_depth)
         above = grid.origin[1] + np.arange(grid.shape[1]) * grid.spacing > torso.top
         near = torso.inside(grid, -LYING) | above[:, None]
     return outside, near
@@ -143,7 +152,8 @@ def _torso(scene: Scene, masks: tuple[Mask, ...], options: Options) -> Torso | N
     """Return the fitted torso, None if disabled."""
     if not (options.cut_body and options.mode == "labels"):
         return None
-    return fit_torso(scene.head, scene.cameras, masks)
+    found = fit_torso(scene.head, scene.cameras, masks)
+    return Torso.under(scene.head) if found is None and scene.one_sided else found
 
 
 @dataclass(frozen=True)
@@ -183,6 +193,8 @@ class _Views:
     forgive: int
     clothed: bool = False
     """True when the surfaces hold the clothes' depth too."""
+    mirrored: int = 0
+    """How many at the end are mirror images of the others; none where photos go around the head."""
 
     @classmethod
     def of(cls, scene: Scene, masks: tuple[Mask, ...], options: Options) -> _Views:
@@ -190,11 +202,12 @@ class _Views:
             raise InputError(
                 f"the scene has {len(scene.cameras)} cameras but {len(masks)} masks came"
             )
-        views = tuple(
-            _View.of(scene.head, camera, mask, options)
-            for camera, mask in zip(scene.cameras, masks, strict=True)
-        )
-        return cls(views, _forgiven_votes(scene, options))
+        pairs = list(zip(scene.cameras, masks, strict=True))
+        mirrored = len(pairs) if options.mode == "labels" and scene.one_sided else 0
+        if mirrored:
+            pairs += [(camera.mirrored(), _mirror(mask)) for camera, mask in pairs]
+        views = tuple(_View.of(scene.head, camera, mask, options) for camera, mask in pairs)
+        return cls(views, _forgiven_votes(scene, options), mirrored=mirrored)
 
     def in_front_of(self, torso: Torso) -> _Views:
         """Return the views with the torso as the surface of the clothes."""
@@ -209,6 +222,10 @@ class _Views:
     def dense(self) -> list[LabelledView]:
         """Return the views that carve the dense hull."""
         return [view.labelled(view.dense) for view in self.views]
+
+
+def _mirror(mask: Mask) -> Mask:
+    return replace(mask, labels=mask.labels[:, ::-1], alpha=None)
 
 
 def _touched_edges(mask: Mask) -> tuple[bool, bool, bool, bool]:
@@ -245,7 +262,7 @@ def _disc(radius: float) -> UInt8Array:
 
 
 def _grid_around_hair(
-    scene: Scene, views: _Views, torso: Torso | None, options: Options
+    scene: Scene, views: _Views, torso: Torso | None, shell: Shell | None, options: Options
 ) -> VoxelGrid:
     """Return the grid that holds the hair, found on coarse cells.
 
@@ -254,8 +271,8 @@ def _grid_around_hair(
     low = scene.head.vertices.min(axis=0).astype(np.float64) - BELOW_HEAD
     high = scene.head.vertices.max(axis=0).astype(np.float64) + ABOVE_HEAD
     coarse = VoxelGrid.around(low, high, COARSE_CELLS * options.voxel_size)
-    outside, near = _room(coarse, torso, options)
-    occupied = carve(coarse, outside, near, views.loose(), _rule(options, views.forgive))
+    outside, near = _room(coarse, torso, shell, options)
+    occupied = carve(coarse, outside, near, views.loose(), _rule(options, views))
     cells = np.argwhere(_largest_part(occupied))
     share = len(cells) * coarse.spacing**3 / MOST_HAIR
     spacing = options.voxel_size * max(1.0, share) ** (1 / 3)
@@ -282,7 +299,7 @@ def _carve_both(
     grid: VoxelGrid, outside: BoolArray, near: BoolArray, views: _Views, options: Options
 ) -> tuple[BoolArray, BoolArray]:
     if options.mode == "votes":
-        rule = _rule(options, forgive=len(views.views))
+        rule = _rule(options, replace(views, forgive=len(views.views)))
         voted = carve(grid, outside, near, views.loose(), rule)
         if options.erosions:
             voted = erode_cells(voted, options.erosions)
@@ -290,7 +307,7 @@ def _carve_both(
             voted = dilate_cells(voted, options.dilations) & outside
         voted = _largest_part(voted)
         return voted, voted
-    rule = _rule(options, views.forgive)
+    rule = _rule(options, views)
     body = views if views.clothed else _with_person_hull(grid, views, options)
     loose = _largest_part(carve(grid, outside, near, body.loose(), rule))
     dense = carve(grid, loose, near, body.dense(), rule)
@@ -299,10 +316,12 @@ def _carve_both(
     return loose & reach, dense
 
 
-def _rule(options: Options, forgive: int) -> Rule:
+def _rule(options: Options, views: _Views) -> Rule:
     margin = float(options.front_margin)
     hides = options.mode == "labels" and options.cut_head
-    return Rule(options.min_views, forgive, margin, margin if hides else np.inf)
+    hidden = margin if hides else np.inf
+    before = -BEHIND_SKIN if views.mirrored else margin
+    return Rule(options.min_views, views.forgive, before, hidden, views.mirrored)
 
 
 def _forgiven_votes(scene: Scene, options: Options) -> int:
@@ -320,7 +339,7 @@ def _with_person_hull(grid: VoxelGrid, views: _Views, options: Options) -> _View
         view.labelled(np.where(view.loose == EMPTY, EMPTY, HAIR).astype(np.uint8))
         for view in views.views
     ]
-    hull = carve(grid, everything, everything, persons, _rule(options, forgive=0))
+    hull = carve(grid, everything, everything, persons, _rule(options, replace(views, forgive=0)))
     points = grid.centres_of(hull & ~erode_cells(hull))
     behind = options.body_margin + options.front_margin
     dressed = []

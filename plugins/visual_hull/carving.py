@@ -61,6 +61,9 @@ class Rule(NamedTuple):
     """Depth in front of the person's surface beyond which a cell is empty, metres."""
     hidden_depth: float
     """Depth behind the head's surface beyond which a cell is hidden, metres."""
+    mirrored: int = 0
+    """Views at the end of the list that are mirror images: they carve what no other has hair at,
+    and cells that no view sees are kept."""
 
 
 class Votes(NamedTuple):
@@ -86,11 +89,22 @@ def carve(
     Outside of a picture only cells `near` (X, Y, Z) the person may hold hair.
     """
     cells = Cells(grid.origin, float(grid.spacing), candidates, near)
-    hair, empty = (np.zeros(grid.shape, np.int16) for _ in range(2))
-    votes = Votes(hair, empty, np.zeros(grid.shape, bool))
+    real = len(views) - rule.mirrored
+    votes = _count(cells, views[:real], rule)
+    kept = candidates & (votes.empty <= rule.forgive)
+    if not rule.mirrored:
+        return kept & votes.seen & (votes.hair >= rule.min_views)
+    return kept & (votes.seen | (_count(cells, views[real:], rule).empty <= rule.forgive))
+
+
+def _count(cells: Cells, views: Sequence[LabelledView], rule: Rule) -> Votes:
+    """Return the votes of some views."""
+    shape = cells.candidates.shape
+    hair, empty = (np.zeros(shape, np.int16) for _ in range(2))
+    votes = Votes(hair, empty, np.zeros(shape, bool))
     for view in views:
-        parallel_for(add_votes, grid.shape[0], view, cells, rule, votes)
-    return candidates & votes.seen & (empty <= rule.forgive) & (hair >= rule.min_views)
+        parallel_for(add_votes, shape[0], view, cells, rule, votes)
+    return votes
 
 
 @compiled

@@ -58,7 +58,7 @@ DIFFERENCE, TOLERANCE, MOST_STEPS = 1e-3, 1e-4, 40
 """Of the solver: step of derivatives in standard deviations, relative change at which it stops,
 evaluations."""
 FEWEST_VIEWS, LEAST_CLOTHES = 3, 0.01
-"""Views that must show clothes below the head, and on which share of their pixels."""
+"""Views that must show clothes below the head, all of fewer, and on which share of their pixels."""
 COVERED, STRAY = 0.75, 0.1
 """Share of the clothes that the torso must cover, and of the torso that may lie on background."""
 
@@ -81,7 +81,7 @@ def fit_torso(head: Head, cameras: Sequence[Camera], masks: Sequence[Mask]) -> T
     known = [(c, m) for c, m in zip(cameras, masks, strict=True) if m.person_known]
     usual = Torso.under(head)
     views = [view for view in (_View.of(head, usual, *pair) for pair in known) if view is not None]
-    if len(views) < FEWEST_VIEWS:
+    if len(views) < min(FEWEST_VIEWS, len(masks)):
         return None
     solved = least_squares(
         lambda numbers: _misfits(usual, numbers[None], views)[0],

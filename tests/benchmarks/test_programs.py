@@ -43,6 +43,7 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
         {"STYLES": ("straight",), "SIZE": (48, 64), "WARM_UP": 20},
         ["--strands", "300", "--points", "8", "--cards", "20", "--atlas", "256"],
     ),
+    "few_photos": ({"GUIDES": 60}, ["CAPTURES", "--photos", "1"]),
     "growth": ({}, ["CAPTURES/short", "--strands", "50", "--rounds", "1"]),
     "head_fit": ({"MIXINGS": 1, "ROUNDS": 2}, ["CAPTURES"]),
     "health": ({"GUIDES": 30}, ["CAPTURES", "-o", "CAPTURES/health", "--ways", "cut to 0.6"]),

@@ -139,10 +139,10 @@ def spoil_photo(folder: Path, content: bytes) -> None:
 
 
 WRONG = {
-    "no such folder": lambda f: shutil.rmtree(f),
+    "no such file": lambda f: shutil.rmtree(f),
     "4_back.png: no photo '4_back'": lambda f: (f / "photos" / "4_back.png").unlink(),
-    "2 photos, expected 3 to 36": lambda f: [p.unlink() for p in (f / "photos").glob("[2-7]*")],
-    "37 photos, expected 3 to 36": lambda f: [
+    "0 photos, expected 1 to 36": lambda f: [p.unlink() for p in (f / "photos").glob("*")],
+    "37 photos, expected 1 to 36": lambda f: [
         write_grey(f / "photos" / f"{n}.png", np.zeros((8, 8), np.uint8)) for n in range(10, 39)
     ],
     "4_back.png: not a picture, expected a JPEG, PNG, WebP, TIFF or HEIC": lambda f: spoil_photo(
@@ -214,9 +214,22 @@ def test_wrong_input_gets_one_line(tmp_path: Path, reason: str) -> None:
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("count", [3, 5, 12, 36])
+def test_one_photo_is_a_capture(tmp_path: Path) -> None:
+    """A photo may stand for its folder: one view, named if its file is; other files are refused."""
+    for name in ("me.png", "back.png"):
+        write_grey(tmp_path / name, np.zeros((30, 20), np.uint8))
+    capture = read_capture(tmp_path / "me.png")
+    assert [view.named for view in capture.views] == [False]
+    assert capture.source == tmp_path / "me.png"
+    assert read_capture(tmp_path / "back.png").views[0].azimuth_deg == 180
+    (tmp_path / "notes.txt").write_text("hello")
+    with pytest.raises(InputError, match=r"notes\.txt: expected a JPEG"):
+        read_capture(tmp_path / "notes.txt")
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 5, 12, 36])
 def test_photos_without_names_are_an_even_turn_in_file_order(tmp_path: Path, count: int) -> None:
-    """3 to 36 photos are read; their views are marked as not named, each has a name of its own."""
+    """1 to 36 photos are read; their views are marked as not named, each has a name of its own."""
     for number in range(count):
         write_grey(tmp_path / f"IMG_{number + 5}.png", np.full((20, 20), number, np.uint8))
     views = read_capture(tmp_path).views

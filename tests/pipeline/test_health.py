@@ -18,8 +18,8 @@ from hairkit.grooming.densify import densify
 from hairkit.grooming.wind_waves import add_waves
 from hairkit.head_model.template import default_head
 from hairkit.manager import Manager
-from hairkit.pipeline.figure import GREEN, RED, Figure, Limits
-from hairkit.pipeline.health import assess, summarise
+from hairkit.pipeline.figure import AMBER, GREEN, RED, Figure, Limits
+from hairkit.pipeline.health import assess, assess_seen, summarise
 from hairkit.rendering.picture import draw_views
 from hairkit.synth import grow
 from hairkit.types.camera import Camera
@@ -354,3 +354,12 @@ def test_the_crown_of_tied_hair_is_no_parting(run: Run) -> None:
     spokes = 0.01 * np.broadcast_to(np.eye(3)[:2], (2, 2, 3))
     run.tied = TiedHair((Tail(tie, 0.9, spine, spokes, np.ones(2)),))
     assert not [name for name in run.figures() if name.startswith("parting")]
+
+
+def test_what_is_made_up_is_told() -> None:
+    """The share of strands that a photo shows is amber, with a line that says what the rest is."""
+    line = np.array([[0, 0.1, 0], [0, 0.05, 0]], np.float32)
+    strands = Strands(np.tile(line, (4, 1)), np.arange(5) * 2, group=np.array([0, 1, 1, 1]))
+    (figure,) = assess_seen(strands)
+    assert (figure.value, figure.light) == (0.25, AMBER)
+    assert "made up" in figure.line()

@@ -2,7 +2,7 @@
 import { make, onChange, prepare, refill, refresh, say, send, state } from "./api.js";
 import { showHair } from "./hair_controls.js";
 
-const LEAST_PHOTOS = 3;
+const LEAST_PHOTOS = 1;
 const USES = {
   "for-unreal": "Unreal Engine", "for-unity": "Unity", "for-blender": "Blender",
   "for-maya": "Maya, XGen", "for-houdini": "Houdini", "for-hairworks": "HairWorks",
@@ -68,7 +68,7 @@ function absence() {
   return make("div", { class: "empty" },
     make("h2", {}, running ? "The hair is growing" : "No hair yet"),
     make("p", { class: "quiet" }, running
-      ? "It appears here by itself." : "Three photos are the least, eight are usual."),
+      ? "It appears here by itself." : "One photo is enough, eight are usual."),
     running ? null : onward);
 }
 

@@ -4,7 +4,7 @@ import {
 } from "./api.js";
 import { thumbnail } from "./photo_stage.js";
 
-const LEAST_PHOTOS = 3;
+const LEAST_PHOTOS = 1;
 const VIDEO = /^video\//;
 let advice = {};
 
@@ -92,7 +92,7 @@ class PhotosPage {
     refill(this.list, ...state.photos.map((photo) => card(photo)));
     const enough = count >= LEAST_PHOTOS;
     const text = enough
-      ? `${count} photos. The hair is made by itself; correct a mask only where it is wrong.`
+      ? `${count} photo${count > 1 ? "s" : ""}. The hair is made by itself; correct a mask only where it is wrong.`
       : `${count} of at least ${LEAST_PHOTOS} photos`;
     refill(this.next, make("p", { class: "quiet" }, count ? text : ""), enough ? onward() : null);
   }

@@ -257,6 +257,21 @@ def copies() -> list[Shot]:
     ]
 
 
+@pytest.mark.parametrize("azimuths", [(20.0,), (0.0, 45.0), (-45.0, 0.0, 40.0)])
+def test_photos_of_one_side_are_where_their_faces_say(azimuths: tuple[float, ...]) -> None:
+    """One or two photos, and more that all show the face, are no turn and are not refused."""
+    turn = find(ring(azimuths))
+    assert np.abs(wrap(turn.azimuth_deg - np.array(azimuths))).max() < 5
+    assert not np.isfinite(turn.margin)
+
+
+def test_one_photo_without_face_needs_a_name() -> None:
+    """A lone photo from behind is refused in one line, and taken where its name tells the view."""
+    with pytest.raises(InputError, match="no face is found"):
+        find(ring([180.0]))
+    assert find(named(ring([180.0]), [180.0])).azimuth_deg.tolist() == [180.0]
+
+
 def test_photos_before_one_wall_are_no_copies() -> None:
     """Small heads in large, equal surroundings are compared, not the surroundings."""
     shots = []
@@ -287,8 +302,6 @@ def two_people() -> list[Shot]:
 REFUSED = {
     "IMG_4.jpg: wears other clothes than IMG_0.jpg": two_people,
     "a copy of IMG_": copies,
-    "add photos from behind": lambda: ring([-20, -10, 0, 10, 20, 30]),
-    "nearest to the back": lambda: ring([-50, -25, 0, 25, 50]),
 }
 
 

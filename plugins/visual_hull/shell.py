@@ -1,0 +1,236 @@
+"""How far hair stands off the head where no photo shows it: as far as it does at the outlines.
+
+One photo, or a few from one side, bound the hair across their views and not along them. Hair lies
+about the head as a shell, and its outline shows the shell's thickness at the two bearings beside
+each view, at every height, down to the hair's ends. In between it is interpolated around the head.
+The mirrored photo counts where the photo itself sees nothing: heads are alike on both sides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from hairkit import Camera, Mask, Scene, VoxelGrid
+from hairkit.arrays import BoolArray, Float64Array
+from hairkit.head_model.torso import Torso
+
+CAP = 0.1
+"""Radius of the arcs that measure height above the head's middle, metres."""
+STEP, REACH = 0.004, 0.45
+"""Edge of the table's rows, and how far they go down from the head's middle, metres."""
+BEARINGS = 72
+"""Columns of the table, from behind over the subject's right, the front and the left."""
+PROBE, FARTHEST = 0.002, 0.3
+"""Distance of the points looked up along an outline's radius, and the last one's, metres."""
+NEAR_BEARING = 4.0
+"""Concentration (von Mises) of an outline's say about other bearings: half of it 34 degrees away.
+"""
+MIRRORED = 0.05
+"""Weight of a mirrored outline: it decides only where no other is near."""
+HANGS = 0.499
+"""Share of the outlines, by nearness, that have hair at a height from which there is some: hair of
+one side only reaches to the middle of the back.
+"""
+SMOOTH = 0.008
+"""Standard deviation along the height over which outlines are smoothed, metres."""
+LYING = 0.015
+"""Thickness of hair that lies on face and back, metres."""
+CHIN = -0.15
+"""Height below the head's middle down to which outlines show how thick hair hangs, metres: further
+down it spreads over the shoulders."""
+HOLLOW = np.cos(np.radians(100.0))
+"""Cosine of the bearing up to which hair beside the face hangs as a curtain; behind, it fills all
+the room to the nape."""
+CURTAIN = 0.025
+"""Least thickness of that curtain, metres."""
+FRONT_SHARE = 1.0
+"""How far hair lies before the scalp's front edge, in its thickness beside the head."""
+HANGS_BACK = 0.01
+"""How far behind that edge hair hangs freely below the chin, metres."""
+FACE = 0.4
+"""Cosine of the bearing up to which an outline is that of the face."""
+FACING = 0.3
+"""Least cosine between a view and the head's surface on which it shows hair."""
+
+
+@dataclass(frozen=True, eq=False)
+class Shell:
+    """The room that hair may fill, as radii about the head's axis."""
+
+    middle: Float64Array
+    """(3,) of the cranium, metres."""
+    limit: Float64Array
+    """(BEARINGS, rows) largest radius of hair, metres; negative where none is."""
+    hollow: Float64Array
+    """(BEARINGS, rows) radius up to which there is none, metres."""
+    sides: tuple[tuple[float, Float64Array], ...]
+    """Bearing (radians) of each outline, and its radius (rows,)."""
+
+    @classmethod
+    def of(cls, scene: Scene, masks: Sequence[Mask], torso: Torso | None) -> Shell:
+        """Return the shell that the outlines of all views show."""
+        scalp = scene.head.vertices[scene.head.scalp > 0.5].astype(np.float64)
+        middle = (scalp.min(axis=0) + scalp.max(axis=0)) / 2
+        head = _radii(scene.head.vertices - middle)
+        sides = tuple(
+            (side, _outline(camera, mask, middle, side))
+            for camera, mask in zip(scene.cameras, masks, strict=True)
+            for side in np.radians(camera.azimuth_deg) + np.array([-1, 1]) * np.pi / 2
+        )
+        hang = _hang(head)
+        thickness, there = _between(sides, hang)
+        limit = np.minimum(hang + thickness, _front(scalp - middle, thickness))
+        ahead = np.cos(_bearings())[:, None] > HOLLOW
+        below = _heights() < scalp[scalp[:, 2] > middle[2], 1].min() - middle[1]
+        hollow = np.where(ahead & below, np.minimum(hang, hang + thickness - CURTAIN), 0.0)
+        lying = head + np.clip(thickness, 0, LYING)
+        seen = ahead & (head > 0) & _shows_hair(scene.cameras, masks, middle, head)
+        limit, hollow = np.where(seen, np.maximum(limit, lying), limit), np.where(seen, 0, hollow)
+        if torso is not None:
+            limit = np.maximum(limit, _radii(torso.mesh()[0] - middle) + LYING)
+        return cls(middle, np.where(there, limit, -1.0), hollow, sides)
+
+    def inside(self, grid: VoxelGrid) -> BoolArray:
+        """Return the cells (X, Y, Z) in which there may be hair."""
+        points = grid.centres_of(np.ones(grid.shape, bool)) - self.middle
+        bearing, row, radius = _place(points)
+        limit, hollow = (
+            ndimage.map_coordinates(
+                np.pad(table, ((0, 1), (0, 0)), "wrap"), [bearing, row], order=1, mode="nearest"
+            )
+            for table in (self.limit, self.hollow)
+        )
+        found = (radius <= limit) & (radius >= hollow)
+        for side, outline in self.sides:
+            across = points @ np.array([np.sin(side), 0.0, np.cos(side)])
+            width = np.interp(row, np.arange(len(outline)), outline)
+            found &= (across <= width) | (_tells_nothing(side) & (width == 0))
+        return np.asarray(found.reshape(grid.shape))
+
+
+def _heights() -> Float64Array:
+    """Return the rows' heights: metres below the middle, above it metres along `CAP`."""
+    return np.arange(-REACH, CAP * np.pi / 2 + STEP, STEP)
+
+
+def _place(points: Float64Array) -> tuple[Float64Array, Float64Array, Float64Array]:
+    """Return column, row and radius (N,) of points (N, 3) about the head's middle."""
+    x, y, z = np.asarray(points, np.float64).T
+    level = np.hypot(x, z)
+    above = y > 0
+    height = np.where(above, CAP * np.arctan2(np.maximum(y, 0), level), y)
+    bearing = (np.arctan2(x, z) / (2 * np.pi) + 0.5) * BEARINGS
+    return bearing, (height + REACH) / STEP, np.where(above, np.hypot(level, y), level)
+
+
+def _radii(points: Float64Array) -> Float64Array:
+    """Return the largest radius (BEARINGS, rows) of points (N, 3) of a surface; 0 without any."""
+    bearing, row, radius = _place(points)
+    found = np.zeros((BEARINGS, len(_heights())))
+    rows = np.rint(row).astype(int)
+    known = (rows >= 0) & (rows < found.shape[1])
+    where = np.rint(bearing[known]).astype(int) % BEARINGS, rows[known]
+    np.maximum.at(found, where, radius[known])
+    return np.asarray(ndimage.grey_closing(found, (5, 7), mode="nearest"))
+
+
+def _hang(head: Float64Array) -> Float64Array:
+    """Return radii on which hair lies or hangs: they do not shrink below the head's middle."""
+    below = _heights() <= 0
+    radii = head.copy()
+    radii[:, below] = np.maximum.accumulate(head[:, below][:, ::-1], axis=1)[:, ::-1]
+    return radii
+
+
+def _front(scalp: Float64Array, thickness: Float64Array) -> Float64Array:
+    """Return the radius (BEARINGS, rows) of the plane before which no hair hangs.
+
+    It lies before the front edge of the scalp (N, 3), and of its lowest point at the sides.
+    """
+    heights = _heights()
+    front = scalp[scalp[:, 2] > 0]
+    rows = np.rint(_place(front)[1]).astype(int)
+    edge = np.full(len(heights), -np.inf)
+    np.maximum.at(edge, rows, front[:, 2])
+    known = np.flatnonzero(np.isfinite(edge))
+    edge = np.interp(np.arange(len(edge)), known, edge[known])
+    ahead = np.cos(_bearings())[:, None] * np.cos(np.maximum(heights, 0) / CAP)
+    hangs = np.clip(heights / CHIN, 0, 1)
+    with_hair = edge + (1 - hangs) * FRONT_SHARE * np.maximum(thickness, 0) - hangs * HANGS_BACK
+    return np.where(ahead > 1e-3, with_hair / np.maximum(ahead, 1e-3), np.inf)
+
+
+def _bearings() -> Float64Array:
+    """Return the columns' bearings, radians."""
+    return (np.arange(BEARINGS) / BEARINGS - 0.5) * 2 * np.pi
+
+
+def _shows_hair(
+    cameras: Sequence[Camera], masks: Sequence[Mask], middle: Float64Array, head: Float64Array
+) -> BoolArray:
+    """Return where (BEARINGS, rows) some view that the head's surface faces has hair on it."""
+    out = np.stack([_outwards(bearing) for bearing in _bearings()])
+    points = middle + _feet() + head[..., None] * out
+    found = np.zeros(head.shape, bool)
+    for camera, mask in zip(cameras, masks, strict=True):
+        facing = -(out * camera.view_direction(points)).sum(axis=-1) > FACING
+        found |= facing & _hair_at(camera, mask, points)
+    return found
+
+
+def _hair_at(camera: Camera, mask: Mask, points: Float64Array) -> BoolArray:
+    """Return at which points (..., 3) a view has hair."""
+    x, y = np.moveaxis(np.floor(np.nan_to_num(camera.project(points), nan=-1)).astype(int), -1, 0)
+    known = (x >= 0) & (y >= 0) & (x < camera.width) & (y < camera.height)
+    return np.asarray(known & mask.hair[np.where(known, y, 0), np.where(known, x, 0)])
+
+
+def _outwards(bearing: float) -> Float64Array:
+    """Return the rows' unit directions (rows, 3) at a bearing."""
+    rise = np.maximum(_heights(), 0) / CAP
+    level = np.cos(rise)
+    return np.stack([np.sin(bearing) * level, np.sin(rise), np.cos(bearing) * level], axis=1)
+
+
+def _feet() -> Float64Array:
+    """Return where (rows, 3) the rows' radii begin, off the head's middle, metres."""
+    return np.stack([[0.0, min(height, 0.0), 0.0] for height in _heights()])
+
+
+def _outline(camera: Camera, mask: Mask, middle: Float64Array, side: float) -> Float64Array:
+    """Return the radius (rows,) of the outermost hair at a bearing beside the view; 0 without."""
+    radii = np.arange(0.0, FARTHEST, PROBE)
+    points = middle + _feet()[:, None] + radii[:, None] * _outwards(side)[:, None]
+    return np.asarray(np.where(_hair_at(camera, mask, points), radii, 0.0).max(axis=1))
+
+
+def _tells_nothing(side: float) -> bool:
+    """Return whether an outline without hair is the face's: there is none on any head."""
+    return bool(np.cos(side) > FACE)
+
+
+def _between(
+    sides: Sequence[tuple[float, Float64Array]], support: Float64Array
+) -> tuple[Float64Array, BoolArray]:
+    """Return how far hair reaches beyond the support (BEARINGS, rows), and whether any hangs."""
+    bearings = _bearings()
+    thick, shown, total = np.zeros((3, *support.shape))
+    for mirror, weight in ((1, 1.0), (-1, MIRRORED)):
+        for side, outline in sides:
+            column = round((mirror * side / (2 * np.pi) + 0.5) * BEARINGS) % BEARINGS
+            has = (outline > 0).astype(float)
+            soft = ndimage.gaussian_filter1d(has, SMOOTH / STEP)
+            off = ndimage.gaussian_filter1d(has * (outline - support[column]), SMOOTH / STEP)
+            near = weight * np.exp(NEAR_BEARING * (np.cos(bearings - mirror * side) - 1))[:, None]
+            thick += near * off
+            shown += near * soft
+            total += near * np.where(_tells_nothing(side), soft, 1.0)
+    thick = thick / np.maximum(shown, 1e-9)
+    below = _heights() < CHIN
+    hung = thick[:, ~below & (_heights() < 0)].max(axis=1, keepdims=True)
+    thick[:, below] = np.minimum(thick[:, below], hung)
+    return thick, np.asarray((shown > 0) & (shown >= HANGS * total))

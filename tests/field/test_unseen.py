@@ -1,0 +1,68 @@
+"""Laws of directions and marks of hair that photos do not see."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from ball import ball_evidence
+
+from hairkit.field.unseen import FLOW_WEIGHT, add_flow, add_surface_planes, group_seen
+from hairkit.testing import ball_head
+from hairkit.types.camera import Camera
+from hairkit.types.mask import HAIR, Mask
+from hairkit.types.scene import Scene
+from hairkit.types.strands import CONTINUED, SEEN, Strands
+from hairkit.types.volume import XX, YY, ZZ, Hull, VoxelGrid
+
+
+def shell() -> Hull:
+    """Hair of 3 cm all around a ball of 10 cm."""
+    grid = VoxelGrid.around(np.full(3, -0.16), np.full(3, 0.16), 0.008)
+    far = np.linalg.norm(grid.centres(), axis=-1).astype(np.float32)
+    hair = (far > 0.1) & (far < 0.13)
+    return Hull(grid, hair, hair, far - np.float32(0.1))
+
+
+def test_the_surface_lies_across_its_normal() -> None:
+    """Of a ball's hair the added plane is normal to the radius, in proportion to what is seen."""
+    hull = shell()
+    planes = np.zeros((int(hull.loose.sum()), 6))
+    assert not add_surface_planes(planes, hull, 1.0).any()
+    planes[:, XX] = 1.0
+    added = add_surface_planes(planes, hull, 1.0) - planes
+    at = hull.grid.centres_of(hull.loose).astype(np.float64)
+    outward = at / np.linalg.norm(at, axis=1, keepdims=True)
+    edge = np.linalg.norm(at, axis=1) > 0.12
+    assert np.allclose(added[edge][:, [XX, YY, ZZ]] / 0.5, outward[edge] ** 2, atol=0.15)
+
+
+def test_unseen_hair_runs_to_the_tips() -> None:
+    """Where nothing is certain the direction is the slope; certain cells keep theirs."""
+    hull = shell()
+    growth = -hull.grid.centres()[..., 1].astype(np.float32)
+    count = int(hull.loose.sum())
+    tensor, sure = np.zeros((count, 6), np.float32), np.zeros(count, np.float32)
+    tensor[:, XX] = 1
+    sure[::2] = 1
+    mixed, weight = add_flow(hull, growth, tensor, sure)
+    assert mixed[1::2, YY] == pytest.approx(1.0, abs=1e-5)
+    assert mixed[::2, XX].min() > 0.9
+    assert weight[1::2] == pytest.approx(FLOW_WEIGHT)
+
+
+def test_strands_before_a_camera_are_seen() -> None:
+    """Strands in front of the head are seen, those behind it and outside of the mask are not."""
+    camera = Camera.on_turn(0.0, distance=1.0, focal=400.0, width=160, height=160)
+    down = np.linspace(0.03, -0.03, 8)
+    lines = [np.stack([0 * down + x, down, 0 * down + z], axis=1) for x, z in
+             ((0.0, 0.128), (0.0, -0.128), (0.11, 0.05))]  # fmt: skip
+    strands = Strands(np.concatenate(lines).astype(np.float32), np.arange(4) * 8)
+    labels = np.zeros((160, 160), np.uint8)
+    labels[:, 60:100] = HAIR
+    scene = Scene(("front",), (camera,), ball_head())
+    evidence = replace(ball_evidence(), scene=scene, masks=(Mask(labels, True),), hull=shell())
+    found = group_seen(strands, evidence)
+    assert found.group is not None
+    assert found.group.tolist() == [SEEN, CONTINUED, CONTINUED]

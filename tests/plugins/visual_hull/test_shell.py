@@ -1,0 +1,97 @@
+"""Laws of the shell that continues hair to where no photo shows it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hairkit_plugins.visual_hull import Options, build_hull
+
+from hairkit.cameras.depth_raster import head_depth
+from hairkit.head_model.template import default_head
+from hairkit.types.camera import Camera
+from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
+from hairkit.types.scene import Scene
+from hairkit.types.volume import Hull
+
+WIDTH, HEIGHT = 270, 360
+THICK, LOW = 0.02, -0.12
+"""Metres of hair beside the head, and where it ends."""
+OPTIONS = Options(voxel_size=0.006)
+
+
+def photo(azimuth: float = 0.0, aside: float = 0.0) -> tuple[Scene, tuple[Mask, ...]]:
+    """One photo of the default head with a bob, whose side may be thicker by `aside` metres."""
+    head = default_head()
+    camera = Camera.on_turn(
+        azimuth, distance=0.8, target=[0, -0.05, 0], focal=600.0, width=WIDTH, height=HEIGHT
+    )
+    depth = head_depth(head, camera)
+    x, y = np.meshgrid(np.arange(WIDTH) + 0.5, np.arange(HEIGHT) + 0.5)
+    across = camera.unproject(np.stack([x, y], axis=-1), np.full(x.shape, 0.8))
+    side = across @ np.array([np.cos(np.radians(azimuth)), 0, -np.sin(np.radians(azimuth))])
+    wide = 0.0884 + THICK + aside * (side > 0)
+    up = np.maximum(across[..., 1], 0) / (0.07 + THICK)
+    hair = ((side / wide) ** 2 + up**2 < 1) & (across[..., 1] > LOW)
+    person = np.isfinite(depth)
+    skin = camera.unproject(np.stack([x, y], axis=-1), np.where(person, depth, 1.0))
+    bare = person & (skin[..., 2] > 0.01) & (skin[..., 1] < 0.04)
+    labels = np.where(hair, HAIR, np.where(person, PERSON, BACKGROUND))
+    labels = np.where(bare, PERSON, labels).astype(np.uint8)
+    return Scene(("photo",), (camera,), head), (Mask(labels, True),)
+
+
+def cells(hull: Hull) -> np.ndarray:
+    """Centres (N, 3) of the dense cells."""
+    return hull.grid.centres_of(hull.dense).astype(np.float64)
+
+
+def test_hair_behind_is_as_thick_as_beside() -> None:
+    """What the photo does not show stands off the head as far as its outline, and is as long."""
+    found = cells(build_hull(*photo(), OPTIONS))
+    level = found[np.abs(found[:, 1]) < 0.01]
+    back = -default_head().vertices[:, 2].min()
+    assert -level[:, 2].min() - back == pytest.approx(THICK, abs=0.008)
+    behind = found[found[:, 2] < -0.07]
+    assert behind[:, 1].min() == pytest.approx(LOW, abs=0.015)
+
+
+def test_seen_skin_stays_bare() -> None:
+    """No cell lies before the face, nor beside what the photo shows of the hair."""
+    scene, masks = photo()
+    found = cells(build_hull(scene, masks, OPTIONS))
+    assert not ((found[:, 2] > 0.07) & (found[:, 1] < 0.0)).any()
+    x, y = np.floor(scene.cameras[0].project(found)).astype(int).T
+    assert np.mean(masks[0].labels[y, x] == BACKGROUND) < 0.05
+
+
+def test_the_mirrored_photo_has_the_mirrored_hull() -> None:
+    """Hair that is thicker on one side is so on the other side of the mirrored photo."""
+    scene, masks = photo(aside=0.02)
+    mirrored = Mask(masks[0].labels[:, ::-1], True)
+    other = replace(scene, cameras=(scene.cameras[0].mirrored(),))
+    widths = [np.quantile(cells(build_hull(*each, OPTIONS))[:, 0], [0.01, 0.99])
+              for each in ((scene, masks), (other, (mirrored,)))]  # fmt: skip
+    assert widths[0] == pytest.approx(-widths[1][::-1], abs=0.008)
+    assert widths[0][1] > -widths[0][0] + 0.01
+
+
+@pytest.mark.parametrize("azimuth", [90.0, 180.0])
+def test_side_and_back_give_a_whole_head_of_hair(azimuth: float) -> None:
+    """From the side, or from behind, hair covers both sides of the head and no face."""
+    found = cells(build_hull(*photo(azimuth), OPTIONS))
+    assert (found[:, 0] > 0.08).any()
+    assert (found[:, 0] < -0.08).any()
+    face = (found[:, 2] > 0.09) & (np.abs(found[:, 1] + 0.05) < 0.04)
+    assert not (face & (np.abs(found[:, 0]) < 0.04)).any()
+
+
+def test_a_photo_from_the_other_side_ends_the_guess() -> None:
+    """Views that leave no half of the head unseen make no shell, two always do."""
+    scene, _ = photo()
+    turn = [Camera.on_turn(a, focal=600.0, width=9, height=9) for a in (0.0, 135.0, 225.0)]
+    assert not Scene(("a", "b", "c"), tuple(turn), scene.head).one_sided
+    assert Scene(("a", "b"), tuple(turn[:2]), scene.head).one_sided
+    near = [Camera.on_turn(a, focal=600.0, width=9, height=9) for a in (0.0, 40.0, 80.0)]
+    assert Scene(("a", "b", "c"), tuple(near), scene.head).one_sided
