@@ -37,6 +37,8 @@ HEALTH_LINE = 20
 """Height of a line of health, pixels."""
 HAIRS = 2500
 """Strands of the hair in the last row: a pixel of a tile is millimetres wide."""
+LEAST_WIDTH = 920
+"""Width of a sheet of few photos, pixels, for the lines of health."""
 GUIDE_POINTS = 20
 """Points a strand in the pictures."""
 CLAY = (0.16, 0.15, 0.14)
@@ -186,7 +188,7 @@ def _arrange(
 ) -> UInt8Array:
     width, height = size
     count = len(names)
-    sheet_width = count * (width + GAP) + GAP
+    sheet_width = max(count * (width + GAP) + GAP, LEAST_WIDTH)
     sheet = np.full((HEADER + len(_ROWS) * (height + GAP), sheet_width, 3), PAPER, np.uint8)
     for column, name in enumerate(names):
         _write(sheet, name, (GAP + column * (width + GAP) + 2, HEADER - 8), INK)
