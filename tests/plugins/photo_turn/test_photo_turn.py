@@ -267,7 +267,7 @@ def test_photos_of_one_side_are_where_their_faces_say(azimuths: tuple[float, ...
 
 @pytest.mark.parametrize("azimuths", [(0.0, 45.0, 90.0), (0.0, -45.0, -90.0), (-40.0, 0.0, 90.0)])
 def test_a_profile_beside_two_faces_is_not_the_back(azimuths: tuple[float, ...]) -> None:
-    """Three photos of one side are no turn, though one shows no face; the same with the back are."""
+    """Three of one side are no turn, though one shows no face; with the back they are."""
     assert np.abs(wrap(find(ring(azimuths)).azimuth_deg - np.array(azimuths))).max() < 10
     back = find(ring([*azimuths[:2], 180.0]))
     assert abs(wrap(back.azimuth_deg[2] - 180.0)) < 35
