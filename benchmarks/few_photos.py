@@ -21,6 +21,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import numpy.typing as npt
 from captures_argument import NO_CAPTURES, add_captures
 
 from hairkit.cameras.similarity import fit_similarity
@@ -28,6 +29,7 @@ from hairkit.errors import InputError
 from hairkit.evaluation import Truth, read_truth
 from hairkit.evaluation.depth_map import first_surface, near_some_surface
 from hairkit.evaluation.scores import OUTER_DEPTH, sample_hits, sample_strands, scores_of_hits
+from hairkit.head_model.template import default_head
 from hairkit.io.capture_reader import TURN, photo_files
 from hairkit.pipeline.recipe import load_recipe
 from hairkit.pipeline.reconstruct import reconstruct
@@ -90,10 +92,17 @@ def _figures(folder: Path, views: list[str]) -> list[float]:
         return [*_scores(groom, truth, views), time.process_time() - began]
 
 
+def _landmarks(truth: Truth) -> npt.NDArray[np.float64]:
+    """Return the true landmarks (68, 3), metres; the template's on heads of `hairkit synth`."""
+    said = json.loads((truth.folder / "truth.json").read_text()).get("landmarks3d")
+    if said is None:
+        return truth.head.vertices[default_head().landmark_vertices].astype(np.float64)
+    return np.array(said["xyz"] if isinstance(said, dict) else said, np.float64)
+
+
 def _scores(groom: Groom, truth: Truth, views: list[str]) -> list[float]:
     """Return F of the visible part and of all hair at 4 mm and 3 mm, and the length's ratio."""
-    said = json.loads((truth.folder / "truth.json").read_text())["landmarks3d"]
-    marks = np.array(said["xyz"] if isinstance(said, dict) else said)[JAW_LANDMARKS:]
+    marks = _landmarks(truth)[JAW_LANDMARKS:]
     own = groom.head.vertices[groom.head.landmark_vertices].astype(np.float64)[JAW_LANDMARKS:]
     moved = fit_similarity(own, marks, np.ones(len(marks))).apply(groom.strands.points)
     strands = replace(groom.strands, points=moved.astype(np.float32))

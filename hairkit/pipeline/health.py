@@ -27,7 +27,7 @@ from hairkit.types.mask import HAIR, PERSON, Mask
 from hairkit.types.parting import Parting
 from hairkit.types.scene import Scene
 from hairkit.types.strands import SEEN, Strands
-from hairkit.types.tie import Tie, TiedHair
+from hairkit.types.tie import TiedHair
 from hairkit.types.turnaround import Turnaround
 from hairkit.types.volume import Hull
 
@@ -79,8 +79,6 @@ CROWN = Limits(0.2, 0.0)
 heads."""
 TIE = Limits(0.4, 0.0)
 """The weakest sign of a tie, see `hairkit.field.find_ties`: 0.6 at a ponytail."""
-ON_TOP = 0.02
-"""Ties less than this far below the top of the head, metres, are on top."""
 ORIENTED = Limits(0.27, 0.2)
 """At least 0.72 with `structure_tensor` on ten captures, 0.30 with `gabor`; 0.22 of directions at
 random, below 0.1 where they are wrong. Without confidence 0."""
@@ -303,25 +301,11 @@ def assess_ties(tied: TiedHair, head: Head) -> tuple[Figure, ...]:
     note = "hull and directions show a tie weakly; look for it on the contact sheet"
     return tuple(
         Figure(
-            "ties", f"{describe_tie(tail.tie, head)}, sureness", tail.sureness, "",
+            "ties", f"{tail.tie.place(head)}, sureness", tail.sureness, "",
             TIE.light(tail.sureness), note,
         )
         for tail in tied.tails
     )  # fmt: skip
-
-
-def describe_tie(tie: Tie, head: Head) -> str:
-    """Return the kind of a tie and its place: `tail at the back, 9 cm above the nape`."""
-    x, y, z = tie.centre.tolist()
-    behind = head.vertices[(head.scalp > 0.5) & (head.vertices[:, 2] < 0)]
-    above = 100 * (y - float(behind[:, 1].min()))
-    top = float(head.vertices[:, 1].max())
-    if abs(x) > max(-z, 0.0):
-        side = "left" if x > 0 else "right"
-    else:
-        side = "top" if y > top - ON_TOP else "back"
-    where = "on" if side == "top" else "at"
-    return f"{tie.kind} {where} the {side}, {above:.0f} cm above the nape"
 
 
 def assess_seen(strands: Strands) -> tuple[Figure, ...]:

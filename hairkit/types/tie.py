@@ -10,8 +10,11 @@ import numpy as np
 from hairkit.arrays import Float32Array, freeze
 from hairkit.errors import DataError
 from hairkit.storage import Stored
+from hairkit.types.head import Head
 
 TieKind = Literal["tail", "braid", "bun"]
+ON_TOP = 0.02
+"""Ties less than this far below the top of the head, metres, are on top."""
 LONGEST_UNIT_ERROR = 1e-3
 """Deviation of an axis' length from 1 that rounding in files may cause."""
 
@@ -38,6 +41,19 @@ class Tie(Stored):
             raise DataError(f"radius of a tie is {self.radius}, expected metres above 0")
         if self.kind not in get_args(TieKind):
             raise DataError(f"kind of a tie is {self.kind!r}, expected {get_args(TieKind)}")
+
+    def place(self, head: Head) -> str:
+        """Return what it is and where: `tail at the back, 9 cm above the nape`."""
+        x, y, z = self.centre.tolist()
+        behind = head.vertices[(head.scalp > 0.5) & (head.vertices[:, 2] < 0)]
+        above = 100 * (y - float(behind[:, 1].min()))
+        top = float(head.vertices[:, 1].max())
+        if abs(x) > max(-z, 0.0):
+            side = "left" if x > 0 else "right"
+        else:
+            side = "top" if y > top - ON_TOP else "back"
+        where = "on" if side == "top" else "at"
+        return f"{self.kind} {where} the {side}, {above:.0f} cm above the nape"
 
 
 @dataclass(frozen=True, eq=False)

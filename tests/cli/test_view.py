@@ -73,7 +73,7 @@ def test_a_folder_of_results_is_opened_by_its_name(groom_path: Path, tmp_path: P
         (("--size", "big"), "--size is 'big'"),
         (("--budget", "-1"), "--budget is -1.0"),
         (("--hairs", "-4"), "--hairs is -4"),
-        (("--capture", "nowhere"), "nowhere: no such folder"),
+        (("--capture", "nowhere"), "nowhere: no such file, expected a photo or a folder of photos"),
         (("--set", "drag"), "--set drag: expected plugin.option=value"),
         (
             ("--headless", "--script", "S", "--set", "gabor.angles=3"),

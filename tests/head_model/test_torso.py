@@ -94,12 +94,13 @@ def test_hair_on_the_shoulders_is_no_shoulder() -> None:
 
 
 def test_without_clothes_there_is_no_torso() -> None:
-    """Masks that know hair alone, photos cropped at the chin, and too few views give None."""
+    """Masks that know hair alone, photos cropped at the chin, and too few of many give None."""
     views = cameras()
     masks = pictured(USUAL, views)
     hair_only = [Mask(np.where(m.labels == HAIR, m.labels, 0), False) for m in masks]
     assert fit_torso(HEAD, views, hair_only) is None
-    assert fit_torso(HEAD, views[:2], masks[:2]) is None
+    assert fit_torso(HEAD, views, [*masks[:2], *hair_only[2:]]) is None
+    assert fit_torso(HEAD, views[:2], masks[:2]) is not None
     chin = int(min(camera.project(USUAL.joint)[1] for camera in views))
     cropped = [replace(camera, height=chin) for camera in views]
     assert fit_torso(HEAD, cropped, [Mask(m.labels[:chin], True) for m in masks]) is None

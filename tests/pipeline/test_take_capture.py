@@ -71,7 +71,7 @@ def test_what_the_default_recipe_reads_is_what_read_capture_reads(shelf: Path) -
 def test_a_name_that_nobody_knows_is_no_folder() -> None:
     """The last plugin says what was looked for; without the stage one line says so."""
     manager = Manager.loaded()
-    with pytest.raises(InputError, match="asset:hero: no such folder"):
+    with pytest.raises(InputError, match="asset:hero: no such file, expected a photo or a folder"):
         take_capture("asset:hero", load_recipe("default"), manager)
     only = load_recipe("default").with_set(["capture=turn_video"])
     with pytest.raises(
