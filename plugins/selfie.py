@@ -2,8 +2,8 @@
 
 A network sees the photo in a square and its mirror image; the mean of both is the answer.
 `selfie_segmentation` tells the person from the background, from all sides. `selfie_multiclass` also
-tells hair from skin and clothes, but may take a head from behind for background: its share of hair
-in a person holds for the person that the first one finds.
+tells hair from skin and clothes, but may take a head from behind for background. The person is the
+mean of both; the second one's share of hair in a person holds for it.
 
 Both are installed by `hairkit models install`; one alone will do. Option `model` names a file in
 their place. Without a network there is no answer.
@@ -55,10 +55,11 @@ def segment_person(view: View, options: Options) -> Person | None:
     if not answers:
         return None
     persons = [maps[0] if len(maps) == 1 else 1 - maps[0] for maps in answers]
+    person = np.asarray(np.mean(persons, axis=0), np.float32)
     if len(answers[-1]) < 3:
-        return Person(_levels(persons[0]))
+        return Person(_levels(person))
     share = (answers[-1][1] + _DOUBT / 2) / (persons[-1] + _DOUBT)
-    return Person(_levels(persons[0]), _levels(persons[0] * share))
+    return Person(_levels(person), _levels(person * share))
 
 
 def find_classes(image: UInt8Array, model: Path, nets: NetProcess) -> Float32Array:

