@@ -92,7 +92,8 @@ class PhotosPage {
     refill(this.list, ...state.photos.map((photo) => card(photo)));
     const enough = count >= LEAST_PHOTOS;
     const text = enough
-      ? `${count} photo${count > 1 ? "s" : ""}. The hair is made by itself; correct a mask only where it is wrong.`
+      ? `${count === 1 ? "1 photo" : `${count} photos`}. The hair is made by itself; `
+        + "correct a mask only where it is wrong."
       : `${count} of at least ${LEAST_PHOTOS} photos`;
     refill(this.next, make("p", { class: "quiet" }, count ? text : ""), enough ? onward() : null);
   }
