@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Callable
 from typing import Any
 
 BEAT_S = 15.0
@@ -21,7 +21,7 @@ class Events:
 
     def send(self, kind: str, **values: Any) -> None:
         """Send an event."""
-        text = f"event: {kind}\ndata: {json.dumps(values)}\n\n"
+        text = _text(kind, values)
         for queue in list(self._queues):
             if queue.qsize() < MOST_WAITING:
                 queue.put_nowait(text)
@@ -40,12 +40,12 @@ class Events:
             queue.put_nowait(None)
         self._queues.clear()
 
-    async def listen(self) -> AsyncIterator[str]:
-        """Yield the text of events as they come."""
+    async def listen(self, summary: Callable[[], dict[str, Any]]) -> AsyncIterator[str]:
+        """Yield the text of events as they come, after one with the project's `summary`."""
         queue: asyncio.Queue[str | None] = asyncio.Queue()
         self._queues.add(queue)
         try:
-            yield "retry: 2000\n\n"
+            yield "retry: 2000\n\n" + _text("project", summary())
             while True:
                 try:
                     text = await asyncio.wait_for(queue.get(), BEAT_S)
@@ -56,3 +56,8 @@ class Events:
                 yield text
         finally:
             self._queues.discard(queue)
+
+
+def _text(kind: str, values: dict[str, Any]) -> str:
+    """Return an event as it is sent."""
+    return f"event: {kind}\ndata: {json.dumps(values)}\n\n"

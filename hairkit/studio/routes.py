@@ -122,7 +122,8 @@ class Routes:
     async def _events(self, request: Request) -> Response:
         if self._studio.events.full:
             raise HTTPException(HTTPStatus.SERVICE_UNAVAILABLE, "too many pages are open")
-        return StreamingResponse(self._studio.events.listen(), media_type="text/event-stream")
+        text = self._studio.events.listen(self._studio.summary)
+        return StreamingResponse(text, media_type="text/event-stream")
 
     async def _feedback(self, request: Request) -> Response:
         return JSONResponse(for_pages())

@@ -94,6 +94,10 @@ class Studio:
         self._wanted.set()
         if self._due():
             self.build = {"state": "waiting"}
+        self._tell()
+
+    def _tell(self) -> None:
+        """Say to all pages how the project stands."""
         self.events.send("project", **self.summary())
 
     def _due(self) -> bool:
@@ -194,6 +198,7 @@ class Studio:
             with contextlib.suppress(TaskError):
                 if not self.formats:
                     self.formats = (await self.editor.call("formats", PHOTO_S))["formats"]
+                    self._tell()
             for step in (self._look_at, self._follow, self._prepare):
                 if await self._on_first(step):
                     break
@@ -215,7 +220,7 @@ class Studio:
         if "outline_of" in self.facts.setdefault(shot.id, {}):
             return False
         await self.outline(shot)
-        self.events.send("project", **self.summary())
+        self._tell()
         return True
 
     async def _follow(self, shot: Shot) -> bool:
@@ -256,7 +261,7 @@ class Studio:
             if not self._due():
                 if self.project.built == self.project.inputs():  # a change was undone
                     self.project.draft.unlink(missing_ok=True)
-                    self.events.send("project", **self.summary())
+                    self._tell()
                 self._set_build(**self._standing())
                 continue
             if self._touched is not None and self.project.groom.is_file():
@@ -283,7 +288,7 @@ class Studio:
         change = asyncio.create_task(self._stop_on_change())
         try:
             await self._call_drafter(touched, self.project.draft)
-            self.events.send("project", **self.summary())
+            self._tell()
         except TaskError:
             pass  # the whole run follows, and says what is wrong
         finally:
@@ -335,7 +340,7 @@ class Studio:
             project.set_built(inputs, done)
             touched = set()
             self._set_build(state="done", **done)
-            self.events.send("project", **self.summary())
+            self._tell()
         except (TaskError, OSError) as error:
             self._set_build(state="failed", reason=str(error))
         except asyncio.CancelledError:

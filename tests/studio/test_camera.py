@@ -74,10 +74,11 @@ def test_nothing_is_good_before_the_server_has_seen_it(page: Any, story: Any) ->
     page.wait_for_timeout(800)
     assert not page.locator(".guide.right").count()
     assert not page.locator(".hint").inner_text().startswith("Good")
-    page.trouble.clear()  # the browser names the requests that got no answer
     answers.append([])
     page.locator(".guide.right").wait_for()
     assert page.locator(".hint").inner_text().startswith("Good")
     answers[0] = ["out_of_frame"]
     page.locator(".hint", has_text="Put the head into the outline").wait_for()
     assert not page.locator(".guide.right").count()
+    # The browser names the requests that got no answer, some of them late.
+    page.trouble[:] = [text for text in page.trouble if "ERR_FAILED" not in text]

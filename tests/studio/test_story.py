@@ -231,6 +231,24 @@ def test_the_hair_moves(page: Any, story: Any) -> None:
     assert settled < 2e-3
 
 
+def test_hair_that_comes_late_is_not_drawn_over_another_page(page: Any, story: Any) -> None:
+    """Who leaves the page of the hair before it is read sees what was asked for instead."""
+    held: list[Any] = []
+    page.route("**/api/result/hair*", lambda route: held.append(route))
+    go(page, story, "hair")
+    page.wait_for_timeout(100)
+    while not held:
+        page.wait_for_timeout(20)
+    go(page, story, "photos")
+    page.locator(".card").first.wait_for()
+    for route in held:
+        with page.expect_event("requestfinished"):
+            route.continue_()
+    page.wait_for_timeout(500)
+    assert page.locator(".card").count()
+    assert not page.locator("#hair").count()
+
+
 def test_a_strand_is_held_by_keys(page: Any, story: Any) -> None:
     """P takes a strand of the hair, which has the photos' skin below it, and lets it go."""
     go(page, story, "hair")

@@ -41,5 +41,5 @@ def opened(browser: Any, server: Any) -> Iterator[Any]:
         yield page
     finally:
         context.close()
-    assert page.trouble == []
+    assert page.trouble == [], page.trouble
     assert foreign == []

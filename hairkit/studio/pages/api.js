@@ -55,11 +55,12 @@ export async function refresh() {
   changed(await get("/api/project"));
 }
 
+// The first event says how the project stands: an answer to a request could be older than the
+// events that came before it.
 export function listen() {
   const events = new EventSource("/api/events");
   events.addEventListener("project", (event) => changed(JSON.parse(event.data)));
   events.addEventListener("build", (event) => changed({ build: JSON.parse(event.data) }));
-  events.addEventListener("open", () => { refresh().catch((error) => say(error.message)); });
   events.addEventListener("error", () => {
     if (events.readyState === EventSource.CLOSED) {
       say("The studio has ended. Run hairkit studio again and open its link; nothing is lost.");

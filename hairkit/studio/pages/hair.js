@@ -1,5 +1,5 @@
 // The hair that turns and moves, and its files.
-import { make, onChange, prepare, refill, refresh, say, send, state } from "./api.js";
+import { get, make, onChange, prepare, refill, say, send, state } from "./api.js";
 import { showHair } from "./hair_controls.js";
 
 const LEAST_PHOTOS = 1;
@@ -34,7 +34,7 @@ export function show(main) {
     shown = version;
     try {
       const packet = await packetOf(version);
-      if (shown !== version) return; // newer hair came meanwhile
+      if (shown !== version) return; // newer hair came meanwhile, or the page was left
       close();
       const stage = make("section",
         { class: "stage", id: "hair", "aria-label": "The hair in motion" });
@@ -42,14 +42,15 @@ export function show(main) {
       side = new Side();
       refill(main, make("div", { class: "split" }, stage, side.element));
     } catch (error) {
-      await refresh().catch(() => {}); // a draft goes when the whole hair comes
-      if (shown === version && (state.draft || state.result) === version) say(error.message);
+      const now = await get("/api/project").catch(() => state);
+      const gone = (now.draft || now.result) !== version; // as a draft when the whole hair comes
+      if (shown === version && !gone) say(error.message);
     }
   }
 
   const stop = onChange(draw);
   draw();
-  return () => { stop(); close(); };
+  return () => { stop(); close(); shown = ""; };
 }
 
 async function packetOf(version) {
