@@ -41,10 +41,8 @@ from hairkit_plugins import pbd, rods
 from hairkit_plugins.pbd.simulator import PbdSimulator
 from hairkit_plugins.rods.simulator import RodSimulator
 
-from hairkit.errors import RenderError
 from hairkit.grooming.prepare_export import dense_groom, select_strands
 from hairkit.head_model.template import default_head
-from hairkit.rendering.context import renderer
 from hairkit.simulation import Simulator, Surroundings, add_shakes
 from hairkit.synth import grow
 from hairkit.types.groom import Groom
@@ -163,9 +161,9 @@ def rate(step: Callable[[int], None], steps: int, rounds: int = 3) -> Speed:
     return 1 / wall, cpu
 
 
-def ours(groom: Groom, backend: str, substeps: int) -> Simulator:
+def ours(groom: Groom, substeps: int) -> Simulator:
     """Return `rods`."""
-    return RodSimulator(groom, rods.Options(backend=backend, substeps=substeps))
+    return RodSimulator(groom, rods.Options(substeps=substeps))
 
 
 def peer(
@@ -235,16 +233,13 @@ def few(groom: Groom) -> Groom:
     return select_strands(groom, np.linspace(0, count - 1, min(FEW, count)).astype(int))
 
 
-def errors(
-    scene: Groom, frames: int, backends: list[str], python: str | None
-) -> dict[Way, tuple[float, float]]:
+def errors(scene: Groom, frames: int, python: str | None) -> dict[Way, tuple[float, float]]:
     """Return largest stretch and distance from the converged motion of all that is compared."""
     found: dict[Way, tuple[float, float]] = {}
-    converged, _ = moved(ours(scene, "fast", CONVERGED), scene, frames)
-    for backend in backends:
-        for substeps in (4, 2):
-            points, stretch = moved(ours(scene, backend, substeps), scene, frames)
-            found["rods " + backend, substeps, 1] = stretch, off_by(points, converged)
+    converged, _ = moved(ours(scene, CONVERGED), scene, frames)
+    for substeps in (4, 2):
+        points, stretch = moved(ours(scene, substeps), scene, frames)
+        found["rods", substeps, 1] = stretch, off_by(points, converged)
     some = few(scene)
     rest = rest_of(some)
     touching, free = (
@@ -270,7 +265,7 @@ def speed_of(way: Way, groom: Groom, frames: int, python: str | None) -> Speed:
     if method == PYPBD_NAME:
         assert python is not None
         return referee_speed(python, groom, (substeps, iterations), few_steps)
-    return speed(ours(groom, method.removeprefix("rods "), substeps), groom, steps)
+    return speed(ours(groom, substeps), groom, steps)
 
 
 def cheapest(rows: list[Row], stretch: float, off: float) -> Row | None:
@@ -300,28 +295,15 @@ def verdicts(rows: list[Row]) -> list[str]:
     return lines
 
 
-def _shaders() -> list[str]:
-    """Return the backend of shaders and print what runs them; nothing where no OpenGL is."""
-    try:
-        with renderer() as gl:
-            print(gl.description)
-    except RenderError as error:
-        print(error)
-        return []
-    return ["compute"]
-
-
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--guides", type=int, nargs="+", default=[1000, 10_000])
     parser.add_argument("--frames", type=int, default=60)
     parser.add_argument("--referee", help="a Python with pyPBD")
-    parser.add_argument("--without-shaders", action="store_true")
     args = parser.parse_args()
-    backends = ["fast", *([] if args.without_shaders else _shaders())]
     scene = groom_of(min(*args.guides, SCENE))
-    found = errors(scene, args.frames, backends, args.referee)
+    found = errors(scene, args.frames, args.referee)
     head = f"{'guides':>7} {'method':<30} {'steps/s':>8} {'CPU ms':>8} {'stretch %':>9}"
     print(f"{head} {'off mm':>7} ratio")
     for count in args.guides:

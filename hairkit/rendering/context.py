@@ -7,7 +7,6 @@ import os
 import threading
 from collections.abc import Callable, Iterator
 from importlib import import_module, resources
-from pathlib import Path
 from typing import Any, TypeVar
 
 import moderngl
@@ -21,7 +20,6 @@ from hairkit.system import gl_backends, gl_cure
 REQUIRED_VERSION = 430
 """OpenGL 4.3, for compute shaders and storage buffers."""
 
-_CARDS = ("dri/renderD*", "nvidia[0-9]*")
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swr")
 """Words in the names of renderers that run on the CPU."""
 
@@ -80,24 +78,18 @@ class Renderer:
         try:
             for key in programs:
                 self.program(*key.split("/"))
-            for key in computes:
-                name, *definitions = key.split()
-                pairs = (text.split("=") for text in definitions)
-                self.compute(name, **{word: int(value) for word, value in pairs})
+            for name in computes:
+                self.compute(name)
         except BaseException:
             self._programs, self._computes = programs, computes
             raise
 
-    def compute(self, name: str, **definitions: int) -> moderngl.ComputeShader:
-        """Return the compute shader `name.comp`, with `#define`s for `definitions`."""
-        key = " ".join([name, *(f"{word}={value}" for word, value in definitions.items())])
-        if key not in self._computes:
+    def compute(self, name: str) -> moderngl.ComputeShader:
+        """Return the compute shader `name.comp`."""
+        if name not in self._computes:
             source = shader_source(f"{name}.comp")
-            lines = [f"#define {word} {value}\n" for word, value in definitions.items()]
-            version, text = source.split("\n", 1)
-            full = "\n".join([version, "".join(lines) + text])
-            self._computes[key] = _compile(key, lambda: self.context.compute_shader(full))
-        return self._computes[key]
+            self._computes[name] = _compile(name, lambda: self.context.compute_shader(source))
+        return self._computes[name]
 
 
 @contextlib.contextmanager
@@ -121,23 +113,6 @@ def renderer() -> Iterator[Renderer]:
             _depth -= 1
         if error != "GL_NO_ERROR":
             raise RenderError(f"drawing failed with OpenGL error {error} ({_renderer.backend})")
-
-
-def is_current(gl: Renderer) -> bool:
-    """Return whether a renderer is still that of this process; after a fork it is the parent's."""
-    return gl is _renderer and _owner == os.getpid()
-
-
-def on_graphics_card() -> bool:
-    """Return whether this process draws, or would draw, with a graphics card."""
-    made = _renderer is not None and _owner == os.getpid()
-    if not made and not any(found for pattern in _CARDS for found in Path("/dev").glob(pattern)):
-        return False
-    try:
-        with renderer() as gl:
-            return not gl.software
-    except RenderError:
-        return False
 
 
 def install(context: moderngl.Context, backend: str) -> Renderer:

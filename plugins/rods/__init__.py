@@ -10,7 +10,6 @@ gravity.
 * `backend`: what backends share, and the compiled one
 * `block`: strands side by side; constants and contact of all backends
 * `frames`: turns of frames, compiled
-* `gl_backend`: substeps in compute shaders
 * `kernel_contact`: contact and friction, compiled
 * `kernels`: a substep, compiled
 * `limits`: what stiffness rods can follow

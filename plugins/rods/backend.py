@@ -1,9 +1,6 @@
-"""What all backends share, and the compiled one, on all cores."""
+"""The compiled engine: blocks of rods on all cores."""
 
 from __future__ import annotations
-
-from abc import ABC, abstractmethod
-from typing import Any
 
 import numpy as np
 
@@ -19,17 +16,19 @@ from .linear_system import System
 from .rods import Rods, State, rest_state
 
 
-class Engine(ABC):
-    """A backend: how the state is kept; subclasses advance it."""
+class Engine:
+    """Keeps the state of rods in blocks of lanes, of float32 or float64, and advances it."""
 
-    rows: Any
-    """(B, L, n, 16 or more) `block.NodeState` of B times L rods; the last ones may be void."""
-    mass: Any
-    """(B, L, n) kilograms; 0 of void rods."""
-
-    def __init__(self, rods: Rods, contact: Contact) -> None:
-        self.rods, self.contact = rods, contact
-        self.mass = rods.mass[:, None]
+    def __init__(self, rods: Rods, contact: Contact, kind: Kind = np.float32) -> None:
+        self.rods, self.contact, self._kind = rods, contact, kind
+        blocks = -(-len(rods.mass) // LANES)
+        self._planes = np.zeros((blocks, rods.nodes, block.PLANES, LANES), kind)
+        self.rows = np.moveaxis(self._planes[:, :, : block.CONSTANT], -1, 1)
+        """(B, L, n, 16) `block.NodeState` of B times L rods; the last ones may be void."""
+        self.mass = np.moveaxis(pack_lanes(rods.mass, kind), -1, 1)
+        """(B, L, n) kilograms; 0 of void rods."""
+        self.mass[-1, (len(rods.mass) - 1) % LANES + 1 :] = 0.0  # only fills the block
+        self._system: System | None = None
         self.state = rest_state(rods)
 
     @property
@@ -40,31 +39,7 @@ class Engine(ABC):
 
     @state.setter
     def state(self, value: State) -> None:
-        self._keep(block.state_rows(self.rods, value))
-
-    def _keep(self, rows: Float64Array) -> None:
-        """Take the state (S, n, 16)."""
-        self.rows = rows[:, None]
-
-    @abstractmethod
-    def run(self, system: System, steps: StepArrays, outer: Float64Array) -> None:
-        """Do the substeps; `outer` is `block.acting`."""
-
-
-class FastEngine(Engine):
-    """Rods in blocks of lanes."""
-
-    def __init__(self, rods: Rods, contact: Contact, kind: Kind = np.float32) -> None:
-        blocks = -(-len(rods.mass) // LANES)
-        self._kind = kind
-        self._planes = np.zeros((blocks, rods.nodes, block.PLANES, LANES), kind)
-        self.rows = np.moveaxis(self._planes[:, :, : block.CONSTANT], -1, 1)
-        super().__init__(rods, contact)
-        self._system: System | None = None
-        self.mass = np.moveaxis(pack_lanes(rods.mass, kind), -1, 1)
-        self.mass[-1, (len(rods.mass) - 1) % LANES + 1 :] = 0.0  # only fills the block
-
-    def _keep(self, rows: Float64Array) -> None:
+        rows = block.state_rows(self.rods, value)
         self._planes[:, :, : block.CONSTANT] = 0.0
         self._planes[:, :, : rows.shape[2]] = pack_lanes(rows, self._kind)
 

@@ -44,10 +44,9 @@ class Options(NodeOptions):
         doc="Friction iterations under strand tension: 0 ignores it, 4 meets Euler-Eytelwein.",
     )
     backend: str = option(
-        "auto",
-        choices=("auto", "reference", "fast", "compute"),
-        doc="fast: compiled, float32; reference: the same in float64; compute: shaders; auto: fast,"
-        " on graphics cards too, where compute has not been timed.",
+        "fast",
+        choices=("fast", "reference"),
+        doc="fast: compiled, float32; reference: the same in float64.",
     )
 
     def resolved(self, physics: HairPhysics) -> Options:

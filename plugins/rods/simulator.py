@@ -15,7 +15,7 @@ from hairkit.simulation.rigid_motion import inverse_motion
 from hairkit.simulation.substeps import Course, StepArrays
 from hairkit.simulation.vectors import Floats
 
-from .backend import Engine, FastEngine
+from .backend import Engine
 from .block import Contact, acting, state_of
 from .limits import max_stiffness, overhang
 from .linear_system import Rates, System, assemble
@@ -58,7 +58,7 @@ class RodSimulator(NodeSimulator):
         return elastic_energy(self.rods, place, frames, self._pull) - self._rest_energy
 
     def _build(self, near: Float64Array) -> None:
-        """Make the rods and their backend."""
+        """Make the rods and their engine."""
         options = self._options
         self.rods = rods = self._stiffen(options)
         self._pull = self._pull_to_rest()
@@ -70,13 +70,9 @@ class RodSimulator(NodeSimulator):
         self._engine = self._make_engine(contact)
 
     def _make_engine(self, contact: Contact) -> Engine:
-        """Return the backend of the options."""
-        name = self._options.backend
-        if name == "compute":
-            from .gl_backend import ComputeEngine
-
-            return ComputeEngine(self.rods, contact)
-        return FastEngine(self.rods, contact, np.float64 if name == "reference" else np.float32)
+        """Return the engine of the options."""
+        exact = self._options.backend == "reference"
+        return Engine(self.rods, contact, np.float64 if exact else np.float32)
 
     def _stiffen(self, options: Options) -> Rods:
         """Return the rods, whose natural shape balances gravity at the captured shape."""

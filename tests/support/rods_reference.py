@@ -79,7 +79,10 @@ def _motion(rows: Float64Array) -> Float64Array:
 
 
 class TwinEngine(Engine):
-    """The twin as a backend."""
+    """The twin as an engine."""
+
+    def __init__(self, rods: Rods, contact: Contact) -> None:
+        super().__init__(rods, contact, np.float64)
 
     def run(self, system: System, steps: Steps, outer: Float64Array) -> None:
         """Do the substeps."""
@@ -91,7 +94,7 @@ class TwinEngine(Engine):
 
 
 class TwinSimulator(RodSimulator):
-    """The simulator with the twin as its backend."""
+    """The simulator with the twin as its engine."""
 
     def _make_engine(self, contact: Contact) -> Engine:
         return TwinEngine(self.rods, contact)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hairkit_plugins.rods.backend import FastEngine
+from hairkit_plugins.rods.backend import Engine
 from hairkit_plugins.rods.block import Contact, acting
 from hairkit_plugins.rods.rods import rest_state
 from rods_bench import DENSITY, LENGTH, NOTHING, G, load_of, rods_of, steps_of, straight, system_of
@@ -70,7 +70,7 @@ def test_compiled_ropes_slip_as_those_of_the_reference(rounds: int) -> None:
     contact = Contact(Bodies(bollard()), np.zeros_like(rods.mass), 0.3, 0.5, rounds)
     system, steps = system_of(rods, 1 / 240), steps_of(load_of(), 4, 1 / 240)
     places = []
-    for engine in (TwinEngine(rods, contact), FastEngine(rods, contact)):
+    for engine in (TwinEngine(rods, contact), Engine(rods, contact)):
         for _ in range(3):
             engine.run(system, steps, acting(rods, NOTHING, force))
         places.append(engine.state.position)

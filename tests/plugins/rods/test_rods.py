@@ -326,7 +326,7 @@ def mixed(
 @pytest.mark.parametrize("copies", [1, 60])
 def test_hair_among_hair_moves_as_its_twin(groom: Groom, copies: int) -> None:
     """Crowded and moving, on a moving head: velocities of metres a second agree to 0.01 mm/s."""
-    from hairkit_plugins.rods.backend import FastEngine
+    from hairkit_plugins.rods.backend import Engine
 
     rods = RodSimulator(groom, Options(backend="reference")).rods
     pick = np.tile(np.arange(len(rods.points)), copies)
@@ -340,7 +340,7 @@ def test_hair_among_hair_moves_as_its_twin(groom: Groom, copies: int) -> None:
     )
     head_step = add_shakes(["yaw:40:1"], groom.head)(0.01)
     hair_grid = make_hair_grid(rods.points, rods.mass)
-    engine = FastEngine(rods, untouched(rods))
+    engine = Engine(rods, untouched(rods))
     engine.state = state
     place, speed = engine.rows[..., :3], engine.rows[..., 4:7]
     hair_grid.mix(place, speed, engine.mass, head_step, (5.0, 4.0, 1 / 60))

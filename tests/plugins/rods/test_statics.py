@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hairkit_plugins.rods.backend import FastEngine
+from hairkit_plugins.rods.backend import Engine
 from hairkit_plugins.rods.block import acting
 from hairkit_plugins.rods.limits import max_stiffness
 from hairkit_plugins.rods.rods import (
@@ -266,6 +266,6 @@ def test_short_stiff_coils_stay_at_rest(curl: float, spacing: float) -> None:
     bending = max_stiffness(points, 1 / 240)[:, None]
     plain = rods_of(points, 1.0, bending)
     rods = balance_load(plain, plain.mass[..., None] * DOWN)
-    engine, still = FastEngine(rods, untouched(rods)), acting(rods, NOTHING, None)
+    engine, still = Engine(rods, untouched(rods)), acting(rods, NOTHING, None)
     engine.run(system_of(rods, 1 / 240), steps_of(load_of(DOWN), 240, 1 / 240), still)
     assert np.abs(engine.state.position - points).max() < 1e-3 * spacing
