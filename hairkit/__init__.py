@@ -81,6 +81,9 @@ if TYPE_CHECKING:
     from hairkit.types.camera import Camera as Camera
     from hairkit.types.capture import Capture as Capture
     from hairkit.types.capture import View as View
+    from hairkit.types.edits import Brush as Brush
+    from hairkit.types.edits import Edit as Edit
+    from hairkit.types.edits import Edits as Edits
     from hairkit.types.face import Face as Face
     from hairkit.types.groom import Groom as Groom
     from hairkit.types.groom import HairMaterial as HairMaterial
@@ -120,6 +123,7 @@ _HOMES = {
     "pipeline.reconstruct": "reconstruct",
     "types.camera": "Camera",
     "types.capture": "Capture View",
+    "types.edits": "Brush Edit Edits",
     "types.face": "Face",
     "types.groom": "Groom HairMaterial HairPhysics",
     "types.head": "Capsules Head Roots",

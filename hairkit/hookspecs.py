@@ -17,6 +17,7 @@ import pluggy
 if TYPE_CHECKING:
     from hairkit.simulation.simulator import Simulator
     from hairkit.types.capture import Capture, View
+    from hairkit.types.edits import Edits
     from hairkit.types.face import Face
     from hairkit.types.finding import Finding
     from hairkit.types.groom import Groom
@@ -142,6 +143,11 @@ def track(
     options: Any,
 ) -> Strands | None:
     """Grow one strand from every root; strand s belongs to root s."""
+
+
+@hookspec(firstresult=True)
+def edit_strands(strands: Strands, hull: Hull, edits: Edits, options: Any) -> Strands | None:
+    """Do the strokes of an artist, in their order; strand s stays that of root s."""
 
 
 @hookspec(firstresult=True)

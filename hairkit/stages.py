@@ -124,6 +124,7 @@ PARTING = Stage("parting", Parting, words="finding the parting", share=1, draft=
 FIELD = Stage("field", OrientationField, "solve_field", "spreading directions", 8, needed=True)
 HAIRLINE = Stage("hairline", Hairline, words="finding the hairline", share=1, draft=KEPT)
 TRACK = Stage("track", Strands, "track", "growing strands", 2, needed=True)
+EDITED = Stage("edit", Strands, "edit_strands", "repeating what was drawn by hand", 0)
 SIMULATOR = Stage("simulator", object, "make_simulator", in_runs=False, command=False)
 EXPORT = Stage("export", bool, "export_groom", "writing files", 2, several=True)
 SHEET = Stage("sheet", bytes, words="drawing the overview", share=5)

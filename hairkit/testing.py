@@ -18,6 +18,7 @@ from hairkit.io.capture_reader import TURN
 from hairkit.stages import OF_HOOK
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture, View
+from hairkit.types.edits import Brush, Edit, Edits
 from hairkit.types.evidence import Evidence
 from hairkit.types.face import Face
 from hairkit.types.groom import Groom
@@ -93,6 +94,8 @@ def stage_arguments(stage: str, folder: Path | None = None) -> dict[str, Any]:
         "field": combed_field(hull.grid),
         "scalp_distance": measure_scalp_distance(scene.head, hull),
         "roots": scalp_roots(scene.head),
+        "strands": bristle_groom().strands,
+        "edits": Edits((Edit(np.eye(3, dtype=np.float32) * _HAIR, Brush("comb")),)),
     }
     kinds = get_type_hints(Evidence)
     return {name: every[name] if name in every else kinds[name]() for name in OF_HOOK[stage].takes}

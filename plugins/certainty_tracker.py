@@ -80,7 +80,7 @@ def track(hull: Hull, field: OrientationField, roots: Roots, options: Options) -
     rows = np.arange(points.shape[1])[None, :] < counts[:, None]
     offsets = np.concatenate([[0], np.cumsum(counts)])
     strands = Strands(points[rows], offsets, root_uv=roots.uv).resampled(options.points)
-    return push_out_of_head(strands, hull, options.clearance)
+    return push_out_of_head(strands, hull.grid, hull.head_distance, options.clearance)
 
 
 def bent_normals(normals: Float32Array, bend_deg: float) -> Float64Array:

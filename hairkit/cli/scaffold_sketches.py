@@ -182,6 +182,23 @@ points = roots.positions[:, None] + along * roots.normals[:, None]
 offsets = np.arange(len(roots) + 1) * 10
 return Strands(points.reshape(-1, 3), offsets, root_uv=roots.uv)""",
     ),
+    "edit_strands": Sketch(
+        "Strokes of hairkit's brushes, and of one that lets hair sink.",
+        (
+            _NUMPY,
+            "from hairkit.grooming.brushes import BRUSHES, HeadRoom, brush_strands",
+        ),
+        'drop: float = option(0.01, low=0.0, high=1.0, doc="Of the brush sink.", unit="m")',
+        """
+def sink(hair, strokes):
+    for stroke in strokes:
+        reach = stroke.amount * stroke.reach(hair.points)[0]
+        hair.move(-reach[..., None] * np.array([0.0, 1.0, 0.0]))
+
+
+brushes = BRUSHES | {"sink": (sink, options.drop)}
+return brush_strands(strands, edits, HeadRoom(hull.grid, hull.head_distance), brushes)[0]""",
+    ),
     "make_simulator": Sketch(
         "Hair that goes rigidly with the head.",
         (

@@ -11,7 +11,7 @@ from hairkit.arrays import Float32Array, Float64Array
 from hairkit.field.sampling_kernels import copy_point, gradient_at, sample_at
 from hairkit.parallel import compiled_with, parallel_for
 from hairkit.types.strands import Strands
-from hairkit.types.volume import Hull
+from hairkit.types.volume import VoxelGrid
 
 ROUNDS = 3
 """Times that a point is moved along the gradient of the sampled distance."""
@@ -21,15 +21,18 @@ MIN_POINTS = 2048
 """Least number of points that are worth another thread."""
 
 
-def push_out_of_head(strands: Strands, hull: Hull, clearance: float) -> Strands:
+def push_out_of_head(
+    strands: Strands, grid: VoxelGrid, distance: Float32Array, clearance: float
+) -> Strands:
     """Return strands whose points, but for the roots, keep `clearance` metres from the head.
 
-    It grows from 0 at the root: a strand that keeps all of it at once would leave the skin upright.
+    `distance` (X, Y, Z) is the signed one to the head in the cells of the grid. The clearance grows
+    from 0 at the root: a strand that keeps all of it at once would leave the skin upright.
     """
     points = strands.points.copy()
     apart = clearance * np.minimum(strands.arc_lengths() / FULL_AFTER, 1.0)
     apart[strands.offsets[:-1]] = -np.inf
-    field = _HeadDistance(hull.grid.origin, float(hull.grid.spacing), hull.head_distance[..., None])
+    field = _HeadDistance(grid.origin, float(grid.spacing), distance[..., None])
     parallel_for(_push_points, len(points), field, apart, points, min_chunk=MIN_POINTS)
     return replace(strands, points=points)
 

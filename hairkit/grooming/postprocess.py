@@ -60,7 +60,7 @@ def finish(
         strands = smooth_strands(strands, options.helix_tolerance)
     if options.waves:
         strands = add_waves(make_room(strands, waves, hull), waves)
-    return push_out_of_head(strands, hull, options.clearance)
+    return push_out_of_head(strands, hull.grid, hull.head_distance, options.clearance)
 
 
 def make_room(strands: Strands, waves: Waves, hull: Hull) -> Strands:

@@ -33,6 +33,7 @@ from hairkit.io.video import is_video, read_video
 from hairkit.options import unknown_name
 from hairkit.storage import read_bytes
 from hairkit.types.capture import Capture, View
+from hairkit.types.edits import read_edits
 
 TURN = {
     "front": 0.0,
@@ -55,6 +56,9 @@ NAMES = (*TURN, "top")
 FEWEST, MOST = 1, 36
 """Numbers of photos: one is continued to where it shows nothing, and more than one every 10 degrees
 add nothing."""
+
+EDITS = "edits.json"
+"""File of a capture with strokes of brushes, see `hairkit.grooming.brushes`."""
 
 WORKING_EDGE = 1440
 """Long edge in pixels that photos are scaled down to."""
@@ -138,7 +142,7 @@ def read_folder(path: str | os.PathLike[str], max_edge: int = WORKING_EDGE) -> C
         folder,
         max_edge,
         settings.parting,
-        settings.chosen,
+        replace(settings.chosen, edits=read_edits(folder / EDITS)),
     )
 
 

@@ -161,6 +161,14 @@ def _words(grid: VoxelGrid) -> str:
     return f"{size} cells of {grid.spacing:.4g} m from ({origin})"
 
 
+def _strands_keep_their_roots(strands: Strands, call: Call) -> None:
+    before = call.arguments["strands"]
+    if len(strands) != len(before):
+        raise DataError(f"{len(strands)} strands of {len(before)}, expected all, in their order")
+    if np.abs(strands.roots - before.roots).max(initial=0.0) > ROOT_TOLERANCE:
+        raise DataError("a strand does not begin where it did, expected the same roots")
+
+
 def _a_strand_starts_at_each_root(strands: Strands, call: Call) -> None:
     roots = call.arguments["roots"]
     if len(strands) != len(roots):
@@ -241,6 +249,7 @@ CHECKS: dict[str, tuple[Check, ...]] = {
     "orient": (_angles_have_photo_size,),
     "solve_field": (_field_is_on_the_hull,),
     "track": (_a_strand_starts_at_each_root,),
+    "edit_strands": (_strands_keep_their_roots,),
     "make_simulator": (_is_a_simulator,),
     "export_groom": (_wrote_the_file,),
 }

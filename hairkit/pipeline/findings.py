@@ -38,6 +38,7 @@ from hairkit.pipeline.stage_runner import (
 from hairkit.pipeline.work_folder import digest_of
 from hairkit.stages import (
     DISTANCE,
+    EDITED,
     FIELD,
     FIRST_SCENE,
     FITTED,
@@ -371,12 +372,20 @@ class Findings:
         """A strand from each root."""
         return self.run.once(TRACK, self.evidence, field=self.field, roots=self.roots)
 
+    @result_of(EDITED)
+    def edited(self) -> Given[Strands]:
+        """The strands after what was drawn on them by hand."""
+        edits = self.capture.chosen.edits
+        if not edits or not self.run.recipe.has(EDITED):
+            return self.strands
+        return self.run.once(EDITED, strands=self.strands, hull=self.hull, edits=Given.of(edits))
+
     @found
     def groom(self) -> Groom:
         """The strands on the head with its skin, their colours from the photos."""
         _ = self.view_orientations, self.scene  # what runs beside waits for no task behind it
         skin = self.run.beside(lambda: self.skin)  # strands need none of it
-        evidence, strands = self.evidence.value, self.strands.value
+        evidence, strands = self.evidence.value, self.edited.value
         return assemble_groom(
             self.capture.views, evidence.masks, replace(self.grown_head, maps=skin.result()),
             self.roots.value, group_seen(strands, evidence), evidence.waves, evidence.tied,

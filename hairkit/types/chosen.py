@@ -11,6 +11,7 @@ from hairkit.arrays import Float32Array, Float64Array
 from hairkit.colour import linear_from_srgb, srgb_from_linear
 from hairkit.errors import InputError
 from hairkit.options import option
+from hairkit.types.edits import Edits
 from hairkit.types.groom import HairMaterial
 from hairkit.types.waves import Waves
 
@@ -78,6 +79,8 @@ class Chosen:
     """(4, 4) similarity that moves the fitted head, metres in its own frame, or None."""
     settings: tuple[str, ...] = ()
     """Options of plugins, as `--set` takes them: `structure_tensor.window_sigma=16`."""
+    edits: Edits = field(default_factory=Edits)
+    """Strokes of brushes over the strands."""
 
 
 def _srgb(linear: Float32Array) -> str:

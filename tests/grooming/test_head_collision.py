@@ -13,6 +13,7 @@ from hairkit.types.strands import Strands
 from hairkit.types.volume import Hull
 
 HULL = shell_hull(0.01)
+ROOM = (HULL.grid, HULL.head_distance)
 
 
 def twin(strands: Strands, hull: Hull, clearance: float) -> np.ndarray[tuple[int, int], np.dtype]:
@@ -33,7 +34,7 @@ def test_the_kernel_does_what_its_twin_does(seed: int, clearance: float) -> None
     """Random strands through the ball, some points outside of the grid too."""
     points = np.random.default_rng(seed).uniform(-0.17, 0.17, (40, 3)).astype(np.float32)
     strands = Strands(points, np.arange(9) * 5)
-    found = push_out_of_head(strands, HULL, clearance)
+    found = push_out_of_head(strands, *ROOM, clearance)
     np.testing.assert_allclose(found.points, twin(strands, HULL, clearance), atol=2e-6)
 
 
@@ -41,7 +42,7 @@ def test_points_keep_the_clearance_and_roots_stay(rng: np.random.Generator) -> N
     """Every point but the first of each strand ends outside; free points do not move."""
     points = rng.uniform(-0.11, 0.11, (600, 3)).astype(np.float32)
     strands = Strands(points, np.arange(121) * 5)
-    found = push_out_of_head(strands, HULL, 0.002)
+    found = push_out_of_head(strands, *ROOM, 0.002)
     np.testing.assert_array_equal(found.roots, strands.roots)
     rest = np.setdiff1d(np.arange(600), strands.offsets[:-1])
     away = np.linalg.norm(found.points[rest], axis=1)
@@ -55,6 +56,6 @@ def test_hair_leaves_the_skin_as_it_was_combed() -> None:
     """Strands that run flat over the ball turn up by no more than the clearance over its way."""
     angle = np.linspace(0, 0.3, 64)
     arc = 0.1 * np.stack([np.sin(angle), np.cos(angle), 0 * angle], axis=1)
-    found = push_out_of_head(Strands.from_list([arc.astype(np.float32)]), HULL, 0.001)
+    found = push_out_of_head(Strands.from_list([arc.astype(np.float32)]), *ROOM, 0.001)
     first = np.diff(found.points, axis=0)[0]
     assert first[1] / np.linalg.norm(first) < 0.35

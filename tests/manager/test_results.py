@@ -120,6 +120,10 @@ def strands(change: Callable[[Strands], Strands]) -> Callable[[Arguments], Any]:
     return lambda given: change(right("track", given))
 
 
+def edited(change: Callable[[Strands], Strands]) -> Callable[[Arguments], Any]:
+    return lambda given: change(given["strands"])
+
+
 def simulator(**members: Any) -> Callable[[Arguments], Any]:
     def make(given: Arguments) -> Any:
         good = right("make_simulator", given)
@@ -239,6 +243,12 @@ WRONG: dict[str, dict[str, Callable[[Arguments], Any]]] = {
         ),
         "1 strands have fewer than two points": strands(
             lambda s: replace(s, offsets=np.r_[0, 0, s.offsets[2:]])
+        ),
+    },
+    "edit_strands": {
+        "expected all, in their order": edited(lambda s: s.select(range(len(s) - 1))),
+        "does not begin where it did": edited(
+            lambda s: replace(s, points=s.points + np.float32([0.05, 0, 0]))
         ),
     },
     "make_simulator": {

@@ -137,6 +137,12 @@ def track(roots: Roots, options: Options) -> Strands:
 
 
 @hookimpl
+def edit_strands(strands: Strands, options: Options) -> Strands:
+    _begin("edit", options)
+    return strands
+
+
+@hookimpl
 def export_groom(groom: Groom, path: Path, options: Options) -> bool:
     _begin("export", options)
     write_bytes(path, groom.strands.points.tobytes())
