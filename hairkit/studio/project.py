@@ -5,6 +5,7 @@
     landmarks.json            landmarks that were corrected
     capture.toml              names, order and tones of the photos, where they were given; what was
                               chosen of head, hair and options
+    edits.json                strokes of brushes over the hair
     studio.json               the photos in their order: the source of capture.toml's tables
     result/                   what `hairkit reconstruct PROJECT -o PROJECT/result` writes
     .studio/                  pictures for the pages and uploads on their way; may be deleted
@@ -24,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from hairkit.errors import HairkitError, InputError
-from hairkit.io.capture_reader import FEWEST, MOST, NAMES
+from hairkit.io.capture_reader import EDITS, FEWEST, MOST, NAMES
 from hairkit.io.capture_toml import (
     HeadEntry,
     ViewEntry,
@@ -37,6 +38,7 @@ from hairkit.io.strokes import read_strokes
 from hairkit.storage import read_text, write_bytes, write_text
 from hairkit.studio.photo_files import facts_of, is_photo, natural
 from hairkit.types.chosen import Chosen, ChosenHair
+from hairkit.types.edits import Edits, read_edits
 
 STATE = "studio.json"
 RESULT = "result"
@@ -251,6 +253,15 @@ class Project:
         write_table(self.folder / "capture.toml", "fitted_head", values)
 
     @property
+    def edits(self) -> Edits:
+        """What was drawn over the hair."""
+        return read_edits(self.folder / EDITS)
+
+    def edit(self, edits: Edits) -> None:
+        """Keep what was drawn over the hair."""
+        write_text(self.folder / EDITS, json.dumps({"strokes": edits.values()}) + "\n")
+
+    @property
     def chosen(self) -> Chosen:
         """What was chosen instead of measured."""
         return read_capture_file(self.folder / "capture.toml").chosen
@@ -269,6 +280,7 @@ class Project:
         files += sorted((self.folder / "strokes").glob("*.json"))
         files += sorted((self.folder / "masks").glob("*.png"))
         files += [self.folder / "landmarks.json", self.folder / "capture.toml"]
+        files.append(self.folder / EDITS)
         return json.dumps([facts_of(file) for file in files if file.is_file()])
 
     @property

@@ -17,6 +17,7 @@ from starlette.responses import FileResponse, JSONResponse, Response, StreamingR
 from starlette.routing import Route
 
 from hairkit.errors import HairkitError, one_line
+from hairkit.io.capture_reader import EDITS
 from hairkit.io.capture_toml import HeadEntry
 from hairkit.options import make_options, option
 from hairkit.storage import read_bytes
@@ -28,6 +29,7 @@ from hairkit.studio.result_page import result_page
 from hairkit.studio.studio import BUILD_S, EXPORT_S, PHOTO_S, Studio
 from hairkit.studio.uploads import receive_file, receive_json
 from hairkit.types.chosen import ChosenHair
+from hairkit.types.edits import Edits
 
 TURNS = (8, 12, 16, 24)
 """Numbers of views of a guided turn."""
@@ -87,6 +89,8 @@ class Routes:
             ("/api/pose", "GET", self._pose),
             ("/api/head", "PUT", self._place_head),
             ("/api/head", "POST", self._nudge),
+            ("/api/edits", "GET", self._edits),
+            ("/api/edits", "PUT", self._edit),
             ("/api/choices", "GET", self._choices),
             ("/api/choices", "PUT", self._choose),
             ("/api/build", "POST", self._build),
@@ -285,6 +289,17 @@ class Routes:
             }
             await studio.editor.call("strands", PHOTO_S, values)
             return Response(read_bytes(path), media_type="image/png")
+
+    async def _edits(self, request: Request) -> Response:
+        return JSONResponse({"strokes": self._studio.project.edits.values()})
+
+    async def _edit(self, request: Request) -> Response:
+        """Keep the strokes over the hair: all of them, so that undoing one is leaving it out."""
+        edits = Edits.of((await receive_json(request)).get("strokes"), "edits")
+        async with self._studio.change:
+            self._studio.project.edit(edits)
+        self._studio.changed(touched=[EDITS])
+        return JSONResponse({})
 
     async def _choices(self, request: Request) -> Response:
         folder = {"folder": str(self._studio.project.folder)}

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from hairkit.errors import HairkitError
+from hairkit.io.capture_reader import EDITS
 from hairkit.nets.model_folder import model_folder
 from hairkit.pipeline.work_folder import AHEAD
 from hairkit.stages import EXPORT, OF_NAME, ROWS
@@ -313,7 +314,8 @@ class Studio:
             },
             "guides": min(DRAFT_GUIDES, self.guides),
         }
-        await self.drafter.call("draft", BUILD_S, values)
+        task = "edit" if touched == [EDITS] else "draft"
+        await self.drafter.call(task, BUILD_S, values)
 
     async def _stop_on_change(self) -> None:
         await self._wanted.wait()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,15 +22,18 @@ from hairkit.grooming.densify import roots_between
 from hairkit.grooming.engine_files import ENGINES
 from hairkit.head_model.scalp import roots_at
 from hairkit.imaging.picture_file import encode_picture, write_picture
+from hairkit.io.capture_reader import EDITS
 from hairkit.io.capture_toml import head_entry, head_pose, read_capture_file
 from hairkit.io.photos import MAX_BYTES, read_header, read_photo
 from hairkit.io.video import read_video
 from hairkit.options import make_options
 from hairkit.pipeline.draft import draft
+from hairkit.pipeline.recipe import load_recipe
 from hairkit.pipeline.reconstruct import reconstruct
 from hairkit.pipeline.run_record import RECORD, read_record
 from hairkit.pipeline.take_capture import take_with_choices
-from hairkit.pipeline.work_folder import digest_of
+from hairkit.pipeline.work_folder import LastRun, digest_of
+from hairkit.stages import EDITED, HULL, TRACK
 from hairkit.storage import read_bytes, write_bytes
 from hairkit.studio.clean_photo import clean_photo
 from hairkit.studio.feedback import judge_photo
@@ -46,6 +49,7 @@ from hairkit.studio.photo_tasks import (
     manager,
     prepare_photo,
 )
+from hairkit.types.edits import read_edits
 from hairkit.types.groom import Groom
 from hairkit.types.head import Roots
 
@@ -146,6 +150,19 @@ def draft_groom(request: dict[str, Any], tell: Tell) -> Any:
     return {}
 
 
+def edit_groom(request: dict[str, Any], tell: Tell) -> Any:
+    """Write the `packet` of the last run's groom with the strokes that lie over it now."""
+    folder = Path(request["folder"])
+    groom, last = Groom.load(folder / "result" / "groom.npz"), LastRun(folder / "result" / "work")
+    strands, hull, edits = last.latest(TRACK), last.latest(HULL), read_edits(folder / EDITS)
+    if edits:
+        recipe = load_recipe("default")
+        strands = recipe.ask(manager(), EDITED, strands=strands, hull=hull, edits=edits)
+    strands = replace(groom.strands, points=strands.points, offsets=strands.offsets)
+    _hair_packet(replace(groom, strands=strands), request)
+    return {}
+
+
 def export_groom(request: dict[str, Any], tell: Tell) -> Any:
     """Write the `groom` to `path` in a `format` of `list_formats`: a file, or an engine's."""
     groom, path = Groom.load(request["groom"]), Path(request["path"])
@@ -211,6 +228,7 @@ TASKS: dict[str, Callable[[dict[str, Any], Tell], Any]] = {
     "build": build_groom,
     "draft": draft_groom,
     "export": export_groom,
+    "edit": edit_groom,
     "formats": list_formats,
     "guides": draw_guides,
     "pose": describe_pose,

@@ -12,8 +12,21 @@ import ball_plugin
 import numpy as np
 import pytest
 from ball import RECIPE
+from hairkit_plugins import brushes
 
-from hairkit import Capture, Groom, Mask, Roots, ScalpDistance, Strands, Waves, hookimpl
+from hairkit import (
+    Brush,
+    Capture,
+    Edit,
+    Edits,
+    Groom,
+    Mask,
+    Roots,
+    ScalpDistance,
+    Strands,
+    Waves,
+    hookimpl,
+)
 from hairkit.errors import InputError, PluginError, RenderError
 from hairkit.manager import Manager
 from hairkit.pipeline.recipe import parse_recipe
@@ -50,6 +63,23 @@ def files(out: Path) -> dict[str, bytes]:
     """The content of everything in the output folder but log and record, which hold times."""
     timed = ("hairkit.log", RECORD)
     return {p.name: p.read_bytes() for p in out.iterdir() if p.is_file() and p.name not in timed}
+
+
+def test_strokes_are_done_again_and_can_be_left_out(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Strokes change the strands alone; a stroke that reaches none is named; `edit` is a switch."""
+    plain = run(tmp_path / "plain").strands
+    trim = Edit(np.zeros((0, 3)), Brush("trim", amount=0.01))
+    away = Edit(np.full((1, 3), 9.0), Brush("comb"))
+    drawn = replace(turn_capture(), chosen=Chosen(edits=Edits((trim, away))))
+    given = {"capture": drawn, "extra": {"brushes": brushes}}
+    made = run(tmp_path / "out", "edit=brushes", **given).strands
+    np.testing.assert_allclose(made.lengths(), 0.01, rtol=1e-3)
+    assert "stroke 2 (comb) reaches no hair; it is kept" in caplog.text
+    assert ran(tmp_path / "out", "edit=brushes", **given) == ["export"]
+    without = run(tmp_path / "out", "edit=none", **given).strands
+    np.testing.assert_array_equal(without.points, plain.points)
 
 
 def test_photos_become_a_groom_and_its_files(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ from hairkit.studio.project import Project
 from hairkit.types.camera import Camera
 from hairkit.types.capture import View
 from hairkit.types.chosen import ChosenHair
+from hairkit.types.edits import read_edits
 from hairkit.types.groom import HairMaterial
 from hairkit.types.scene import Scene
 from hairkit.types.waves import Waves
@@ -208,3 +209,23 @@ def test_turns_are_those_that_the_page_names() -> None:
         moved = scene.cameras[0].project(nose)[0] - before
         assert moved @ along > 10
         assert abs(np.cross([*moved, 0], [*along, 0])[2]) < 2
+
+
+def test_strokes_over_the_hair_are_kept(server: Any) -> None:
+    """Strokes come back as they were sent; what is no stroke is refused, and nothing is written."""
+    assert server.ask("GET", "/api/edits").json == {"strokes": []}
+    stroke = {"brush": "cut", "radius": 0.02, "mirror": True, "path": [[0.1, 0, 0]]}
+    assert server.ask("PUT", "/api/edits", {"strokes": [stroke]}).status == 200
+    [kept] = server.ask("GET", "/api/edits").json["strokes"]
+    assert stroke.items() <= kept.items()
+    for wrong in ({"strokes": 7}, {"strokes": [{"radius": -1}]}, {"strokes": [{"path": [1]}]}, {}):
+        answer = server.ask("PUT", "/api/edits", wrong)
+        assert answer.status == 422
+        assert "edits" in answer.json["error"]
+    assert server.ask("GET", "/api/edits").json["strokes"] == [kept]
+    assert read_capture_edits(server.folder) == [kept]
+
+
+def read_capture_edits(folder: Path) -> Any:
+    """Return the strokes of a project as a run reads them."""
+    return read_edits(folder / "edits.json").values()

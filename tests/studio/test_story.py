@@ -306,3 +306,38 @@ def download(page: Any, link: Any, path: Path) -> None:
     with page.expect_download(timeout=1000 * SLOW_S) as caught:
         page.keyboard.press("Enter")
     caught.value.save_as(path)
+
+
+def test_a_brush_is_led_by_keys(page: Any, story: Any) -> None:
+    """A stroke by keys shows at once and is kept; undone it is gone, also after a reload, where it
+    can still be had again."""
+    go(page, story, "hair")
+    page.locator("#hair[data-skin]").wait_for()
+    page.get_by_role("combobox", name="Brush").select_option("comb")
+    tab_to(page, "Hair on a head")
+    before = page.evaluate("Array.from(document.querySelector('#hair').hairMotion.rest)")
+    page.keyboard.press("p")
+    for _ in range(3):
+        page.keyboard.press("ArrowRight")
+    moved = page.evaluate("Array.from(document.querySelector('#hair').hairMotion.rest)")
+    assert max(abs(a - b) for a, b in zip(before, moved, strict=True)) > 0.005
+    with page.expect_response("**/api/result/draft*"):
+        page.keyboard.press("p")
+    [stroke] = strokes_over_hair(story)
+    assert stroke["brush"] == "comb"
+    assert len(stroke["path"]) == 4
+    page.get_by_role("button", name="Undo").click()
+    page.locator("button:disabled", has_text="Undo").wait_for()
+    while strokes_over_hair(story):
+        page.wait_for_timeout(50)
+    page.reload()
+    page.get_by_role("button", name="Redo").click()
+    page.locator("button:enabled", has_text="Undo").wait_for()
+    while not strokes_over_hair(story):
+        page.wait_for_timeout(50)
+    assert strokes_over_hair(story) == [stroke]
+
+
+def strokes_over_hair(story: Any) -> Any:
+    """Return the strokes that the project keeps."""
+    return json.loads((story.folder / "edits.json").read_text())["strokes"]

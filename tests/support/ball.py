@@ -20,7 +20,9 @@ from hairkit.testing import (
 from hairkit.types.evidence import Evidence
 
 PLUGIN_FILE = Path(__file__).with_name("ball_plugin.py")
-TABLES = ("capture", "segment", "scene", "fit", "orient", "hull", "field", "track", "export")
+TABLES = (
+    *("capture", "segment", "scene", "fit", "orient", "hull", "field", "track", "edit", "export"),
+)
 LEFT_OUT = ("landmarks", "person", "turn", "refine")
 RECIPE = "".join(f"{table} = false\n" for table in LEFT_OUT) + "".join(
     f'[{table}]\nplugin = "ball_plugin"\n' for table in TABLES

@@ -1,5 +1,6 @@
 // The hair that turns and moves, and its files.
 import { get, make, onChange, prepare, refill, say, send, state } from "./api.js";
+import { HairBrush } from "./hair_brush.js";
 import { showHair } from "./hair_controls.js";
 
 const LEAST_PHOTOS = 1;
@@ -17,6 +18,7 @@ const DRAFT = "This is a quick preview of your last change: the cameras are thos
 
 export function show(main) {
   let shown = "", side = null;
+  const seen = {}, brush = new HairBrush();
   let close = () => {};
 
   async function draw() {
@@ -38,7 +40,7 @@ export function show(main) {
       close();
       const stage = make("section",
         { class: "stage", id: "hair", "aria-label": "The hair in motion" });
-      close = showHair(stage, packet);
+      close = showHair(stage, packet, { seen, brush });
       side = new Side();
       refill(main, make("div", { class: "split" }, stage, side.element));
     } catch (error) {

@@ -3,26 +3,32 @@ import { HairMotion } from "./hair_motion.js";
 import { HairView, readPacket } from "./hair_view.js";
 
 const GRAB_PX = 30; // a strand is taken within this distance
+const BRUSH_PX = 25; // hair is under the brush within this distance
 const FIRST_POINT = 3; // of a guide that can be taken: those before are at the head
 const PULL_M = 0.012; // metres that a key pulls a strand
 const SHAKE_S = 2.4, SHAKE_TURNS = 3, SHAKE_RAD = 0.7;
 const WIND = 1.5; // of the key, metres in a second
 const HAIR_LABEL = "Hair on a head. Arrow keys turn it, plus and minus zoom, W is wind, S shakes "
-  + "the head. P takes the strand in the middle: arrow keys pull it, P lets it go.";
+  + "the head. P takes the strand in the middle: arrow keys pull it, P lets it go. "
+  + "With a brush, P puts it down there, arrow keys lead it, and P lifts it.";
 
 // Shows hair in an element of the page; returns what ends that.
-export function showHair(stage, buffer) {
-  const controls = new HairControls(stage, readPacket(buffer));
+// Its view is kept in `seen` from one hair to the next; a `brush` draws on it.
+export function showHair(stage, buffer, { seen = {}, brush = null } = {}) {
+  const controls = new HairControls(stage, readPacket(buffer), seen, brush);
   stage.hairMotion = controls.motion; // for scripts that measure the motion
   return () => controls.close();
 }
 
 class HairControls {
-  constructor(stage, packet) {
+  constructor(stage, packet, seen, brush) {
     this.stage = stage;
+    this.seen = seen;
+    this.brush = brush;
     this.canvas = element("canvas", { tabindex: "0", role: "img", "aria-label": HAIR_LABEL });
     stage.append(this.canvas, this.buttons());
     this.view = new HairView(this.canvas, packet);
+    Object.assign(this.view, seen);
     this.motion = new HairMotion(packet);
     this.combing = false; // pointers pull strands
     this.grabbed = null; // the strand that is pulled
@@ -35,6 +41,8 @@ class HairControls {
   }
 
   close() {
+    const { azimuth, elevation, distance } = this.view;
+    Object.assign(this.seen, { azimuth, elevation, distance });
     this.ended = true;
     this.view.close();
   }
@@ -53,7 +61,7 @@ class HairControls {
     });
     shake.addEventListener("click", () => { this.shaken = 0; });
     const made = element("div", { class: "controls" });
-    made.append(comb, label, shake);
+    made.append(comb, label, shake, ...(this.brush?.controls ?? []));
     return made;
   }
 
@@ -76,6 +84,10 @@ class HairControls {
     this.canvas.setPointerCapture(event.pointerId);
     this.pointers.set(event.pointerId, [event.offsetX, event.offsetY]);
     if (this.pointers.size !== 1) return;
+    if (this.brush?.name) {
+      this.stroke(event.offsetX, event.offsetY);
+      return;
+    }
     if (this.combing || event.shiftKey || event.button === 2) {
       this.hold(this.grab(event.offsetX, event.offsetY, GRAB_PX));
     }
@@ -87,13 +99,15 @@ class HairControls {
     const wide = this.reach();
     const dx = event.offsetX - before[0], dy = event.offsetY - before[1];
     this.pointers.set(event.pointerId, [event.offsetX, event.offsetY]);
-    if (this.grabbed) this.pull(this.grabbed.scale * dx, -this.grabbed.scale * dy);
+    if (this.brush?.path) this.stroke(event.offsetX, event.offsetY);
+    else if (this.grabbed) this.pull(this.grabbed.scale * dx, -this.grabbed.scale * dy);
     else if (this.pointers.size === 2) this.zoom(wide / Math.max(this.reach(), 1));
     else this.turn(-0.008 * dx, 0.006 * dy);
   }
 
   up(event) {
     this.pointers.delete(event.pointerId);
+    this.brush?.lift();
     this.hold(null);
   }
 
@@ -108,7 +122,7 @@ class HairControls {
       ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1],
     }[event.key];
     const act = way ? () => this.arrow(...way) : {
-      p: () => this.take(), Escape: () => this.hold(null),
+      p: () => this.press(), Escape: () => { this.brush?.drop(); this.hold(null); },
       "+": () => this.zoom(0.9), "-": () => this.zoom(1.1),
       w: () => { this.wind.value = Number(this.wind.value) > 0 ? 0 : WIND; },
       s: () => { this.shaken = 0; },
@@ -119,7 +133,8 @@ class HairControls {
   }
 
   arrow(right, up) {
-    if (this.grabbed && !this.pointers.size) this.pull(PULL_M * right, PULL_M * up);
+    if (this.brush?.path) this.goOn(PULL_M * right, PULL_M * up);
+    else if (this.grabbed && !this.pointers.size) this.pull(PULL_M * right, PULL_M * up);
     else this.turn(0.1 * right, 0.1 * up);
   }
 
@@ -149,6 +164,56 @@ class HairControls {
   hold(grabbed) {
     this.grabbed = grabbed;
     this.motion.held = grabbed?.hit ?? null;
+  }
+
+  // Puts the brush down in the middle, or lifts it; without one takes a strand, or lets it go.
+  press() {
+    const { clientWidth: w, clientHeight: h } = this.canvas;
+    if (this.brush?.path) this.brush.lift();
+    else if (this.brush?.name) this.stroke(w / 2, 0.4 * h);
+    else this.take();
+  }
+
+  // Leads the brush to a point of the canvas, in pixels, on the hair that is seen there.
+  stroke(x, y) {
+    const hit = this.under(x, y);
+    if (hit) this.draw(hit);
+  }
+
+  // Leads the brush on by metres across and upwards.
+  goOn(across, upwards) {
+    const { right, up } = this.view.camera(), last = this.brush.path.at(-1);
+    this.draw(last.map((value, k) => value + across * right[k] + upwards * up[k]));
+  }
+
+  // Shows at once what a comb does; other brushes show when the studio has done the stroke.
+  draw(at) {
+    const { name, radius } = this.brush, drawn = this.brush.draw(at);
+    if (drawn && name === "comb") this.motion.comb(drawn.last, drawn.way, radius);
+  }
+
+  // Returns the place on the foremost hair under a point of the canvas, in pixels. A stroke goes
+  // along the hair: no farther in depth than across, and at its own depth where there is none.
+  under(x, y) {
+    const { motion: { now }, canvas: { clientWidth: w, clientHeight: h } } = this;
+    const { matrix, eye, right, up, back } = this.view.camera(), slope = Math.tan(0.25);
+    const ray = right.map((v, k) =>
+      (2 * x / w - 1) * slope * (w / h) * v + (1 - 2 * y / h) * slope * up[k] - back[k]);
+    const at = (depth) => eye.map((v, k) => v + depth * ray[k]);
+    let depth = Infinity;
+    for (let i = 0; i < now.length; i += 3) {
+      const [cx, cy, , cw] = clip(matrix, [now[i], now[i + 1], now[i + 2]]);
+      const away = Math.hypot((cx / cw + 1) * w / 2 - x, (1 - cy / cw) * h / 2 - y);
+      if (away < BRUSH_PX) depth = Math.min(depth, cw);
+    }
+    const last = this.brush.path?.at(-1);
+    if (last) {
+      const before = clip(matrix, last)[3];
+      const most = Math.hypot(...at(before).map((v, k) => v - last[k]));
+      if (depth === Infinity) depth = before;
+      depth = Math.max(before - most, Math.min(before + most, depth));
+    }
+    return depth < Infinity ? at(depth) : null;
   }
 
   take() {

@@ -18,7 +18,8 @@ export class HairMotion {
   constructor(packet) {
     const { guides, capsules } = packet.arrays;
     [this.count, this.points] = guides.shape;
-    this.rest = guides.data;
+    this.captured = guides.data;
+    this.rest = Float32Array.from(guides.data); // brushes change it
     this.now = Float32Array.from(guides.data);
     this.before = Float32Array.from(guides.data);
     this.capsules = capsules.data;
@@ -34,6 +35,30 @@ export class HairMotion {
         const i = (g * this.points + p) * 3;
         const along = [0, 1, 2].map((k) => this.rest[i + k] - this.rest[i + k - 3]);
         this.lengths[g * this.points + p] = Math.hypot(...along);
+      }
+    }
+  }
+
+  // Takes hair along with a brush, as hairkit.grooming.brushes does: lengths stay.
+  comb(at, way, radius) {
+    const { rest, now, points, lengths } = this;
+    for (let g = 0; g < this.count; g += 1) {
+      const moved = [];
+      for (let p = 0; p < points; p += 1) {
+        const i = (g * points + p) * 3;
+        const away = Math.hypot(rest[i] - at[0], rest[i + 1] - at[1], rest[i + 2] - at[2]);
+        const share = Math.max(1 - (away / radius) ** 2, 0) ** 2;
+        for (let k = 0; k < 3; k += 1) moved.push(rest[i + k] + share * way[k]);
+      }
+      for (let p = 1; p < points; p += 1) {
+        const i = (g * points + p) * 3;
+        const along = [0, 1, 2].map((k) => moved[3 * p + k] - moved[3 * p + k - 3]);
+        const scale = lengths[g * points + p] / Math.max(Math.hypot(...along), 1e-9);
+        for (let k = 0; k < 3; k += 1) {
+          now[i + k] -= rest[i + k];
+          rest[i + k] = rest[i + k - 3] + scale * along[k];
+          now[i + k] += rest[i + k];
+        }
       }
     }
   }

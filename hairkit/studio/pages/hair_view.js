@@ -142,9 +142,9 @@ export class HairView {
   }
 
   // Sends how far every point of the guides has moved.
-  uploadMotion({ now, rest }) {
+  uploadMotion({ now, captured }) {
     for (let i = 0, j = 0; i < now.length; i += 3, j += 4) {
-      for (let k = 0; k < 3; k += 1) this.shift[j + k] = now[i + k] - rest[i + k];
+      for (let k = 0; k < 3; k += 1) this.shift[j + k] = now[i + k] - captured[i + k];
     }
     const guides = this.packet.arrays.guides.shape[0];
     upload(this.gl, this.moved, this.points, guides, this.shift);
