@@ -4,6 +4,7 @@ Make a groom of tracked or imported strands, thin it out or fill it up, and prep
 
 * `adopt_strands`: a groom from bare strands of a file
 * `assemble`: strands, head and photo colours put together as a groom
+* `brushes`: strands combed, cut and curled by strokes over them
 * `cover_hair`: strands led through hair that no other reaches
 * `decimate`: guides chosen from full hair
 * `densify`: full hair interpolated between guides

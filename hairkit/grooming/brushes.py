@@ -34,6 +34,8 @@ SHORTEST = 0.002
 """Least length of what is left of a strand that is cut, metres."""
 RISE = 0.03
 """Metres from the root after which a strand follows a parting or a puff wholly."""
+GOLDEN = (np.sqrt(5) - 1) / 2
+"""Turns between the curls of one strand and the next, which so begin anywhere."""
 NEIGHBOURS = 8
 """Strands whose mean smoothing draws to."""
 CELL, MARGIN = 0.004, 0.02
@@ -185,7 +187,7 @@ def curl(hair: Hair, strokes: list[Stroke]) -> None:
     across = np.cross(way, hair.outwards(hair.points[:, 0])[:, None])
     across /= np.maximum(np.linalg.norm(across, axis=2, keepdims=True), 1e-9)
     turn = 2 * np.pi / np.hypot(strokes[0].pitch, 2 * np.pi * strokes[0].amount)
-    begin = 2 * np.pi * np.modf(0.618034 * np.arange(len(hair.points)))[0]
+    begin = 2 * np.pi * np.modf(GOLDEN * np.arange(len(hair.points)))[0]
     angle = turn * hair.arcs + begin[:, None]
     winding = np.cos(angle)[..., None] * across + np.sin(angle)[..., None] * np.cross(way, across)
     hair.move(_rise(hair) * np.asarray(weight)[..., None] * winding)

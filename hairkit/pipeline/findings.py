@@ -118,18 +118,10 @@ class Findings:
         guides: int = 1,
         seed: int = 0,
     ) -> None:
-        """Find nothing yet.
+        """Find nothing yet in `photos` as they were read, in any order.
 
-        Parameters
-        ----------
-        run
-            Runs the stages.
-        photos
-            As they were read, in any order.
-        head
-            The head to fit; None for the default head.
-        guides, seed
-            Number of roots, and the seed of their positions.
+        `run` runs the stages, `head` is the one to fit (None: the default head), `guides` and
+        `seed` give the number of roots and their positions.
         """
         self.run, self.photos, self.given_head = run, photos, head
         self.guides, self.seed = guides, seed

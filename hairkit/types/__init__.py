@@ -7,6 +7,7 @@ the packages named after the subject.
 * `capture`: the photos and what is known about each
 * `carried`: what a file held beyond a groom
 * `chosen`: what a user chooses instead of what is measured
+* `edits`: what an artist changed by hand
 * `evidence`: what field and strands are made from
 * `face`: landmarks and direction of a face
 * `finding`: what a check of a file found
