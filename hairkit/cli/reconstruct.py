@@ -14,17 +14,18 @@ from hairkit.cli.settings import STAGE_HELP, add_setting
 from hairkit.errors import InputError
 
 if TYPE_CHECKING:
+    from hairkit.types.capture import Capture
     from hairkit.types.strands import Strands
 
 _DESCRIPTION = """\
 Example: hairkit reconstruct photos/ -o out/
 
 Turn photos of a head into a groom. PHOTOS is a folder with up to 36 photos taken around the head,
-in any order and direction, or one photo, from which unseen hair is continued; or a folder with
-photos/ and, where present, masks/, strokes/ and landmarks.json, matched by name, and a
-capture.toml; or a video of one turn. OUT gets groom.npz, scene.json, the recipe's exports,
-contact_sheet.png, run.json (what was done, and how good it is) and hairkit.log. After an
-interruption, run it again: it continues where it stopped.
+in any order and direction; or the photos themselves: from one, or a few of one side, unseen hair
+is continued; or a folder with photos/ and, where present, masks/, strokes/, landmarks.json and
+edits.json, matched by name, and a capture.toml; or a video of one turn. OUT gets groom.npz,
+scene.json, the recipe's exports, contact_sheet.png, run.json (what was done, and how good it is)
+and hairkit.log. After an interruption, run it again: it continues where it stopped.
 """
 GUIDES = 600
 """Roots by default, as of `hairkit.reconstruct`."""
@@ -43,7 +44,7 @@ def register(subparsers: Any) -> None:
         description=_DESCRIPTION,
     )
     add = parser.add_argument
-    add("photos", nargs="?", metavar="PHOTOS", help="folder of photos, a photo, a video, or a name")
+    add("photos", nargs="*", metavar="PHOTOS", help="a folder, photos, a video, or a name")
     add("-o", "--out", required=True, metavar="OUT", help="output folder")
     add("--sample", action="store_true", help="use the capture that ships with hairkit")
     recipes = f"{', '.join(recipe_names())} or a .toml file"
@@ -87,7 +88,7 @@ def run(args: argparse.Namespace) -> int:
     manager = Manager.loaded(args.plugin)
     head = _head(args)
     edge = _max_edge(args, WORKING_EDGE)
-    capture, recipe = take_with_choices(_photos(args), args.recipe, manager, args.set, edge)
+    capture, recipe = take_with_choices(_photos(args, edge), args.recipe, manager, args.set, edge)
     if args.parting is not None:
         capture = replace(capture, parting=Parting.named(args.parting))
     quiet = args.quiet or args.json
@@ -134,12 +135,14 @@ def _summary(out: Path, strands: Strands) -> dict[str, Any]:
     }
 
 
-def _photos(args: argparse.Namespace) -> str:
-    from hairkit.io.capture_reader import sample_folder
+def _photos(args: argparse.Namespace, edge: int) -> Capture | str:
+    from hairkit.io.capture_reader import read_files, sample_folder
 
-    if args.sample == (args.photos is not None):
-        raise InputError("give either a folder of photos or --sample")
-    return str(sample_folder()) if args.sample else str(args.photos)
+    if args.sample == bool(args.photos):
+        raise InputError("give either photos or --sample")
+    if len(args.photos) > 1:
+        return read_files([Path(photo) for photo in args.photos], edge)
+    return str(sample_folder()) if args.sample else str(args.photos[0])
 
 
 def _max_edge(args: argparse.Namespace, default: int) -> int:

@@ -11,7 +11,7 @@ import json
 import logging
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -111,10 +111,7 @@ def read_folder(path: str | os.PathLike[str], max_edge: int = WORKING_EDGE) -> C
     """Return the capture in a folder, or that of one photo, as `read_capture`."""
     folder = Path(path)
     if folder.is_file():
-        alone = CaptureFile(folder)
-        (place,) = _places(_check_kinds([folder]), alone, folder.parent)
-        one = _view(place, alone, max_edge, None, None, None)
-        return Capture((one,), source=folder, max_edge=max_edge)
+        return replace(read_files([folder], max_edge), source=folder)
     if not folder.is_dir():
         raise InputError(f"{folder}: no such file, expected a photo or a folder of photos")
     photo_folder = folder / "photos" if (folder / "photos").is_dir() else folder
@@ -144,6 +141,20 @@ def read_folder(path: str | os.PathLike[str], max_edge: int = WORKING_EDGE) -> C
         settings.parting,
         replace(settings.chosen, edits=read_edits(folder / EDITS)),
     )
+
+
+def read_files(files: Sequence[Path], max_edge: int = WORKING_EDGE) -> Capture:
+    """Return the capture of photos that lie anywhere; raises `InputError` as `read_capture`."""
+    missing = next((file for file in files if not file.is_file()), None)
+    if missing is not None:
+        raise InputError(f"{missing}: no such photo; give photos alone, or one folder")
+    if len(files) > MOST:
+        raise InputError(f"{files[MOST]}: photo {MOST + 1}, expected {FEWEST} to {MOST}")
+    alone = CaptureFile(files[0])
+    places = _places(_check_kinds(list(files)), alone, files[0].parent)
+    with ThreadPoolExecutor(min(4, os.cpu_count() or 1)) as pool:
+        views = pool.map(lambda place: _view(place, alone, max_edge, None, None, None), places)
+        return Capture(tuple(views), max_edge=max_edge)
 
 
 def sample_folder() -> Path:

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hairkit.errors import InputError
-from hairkit.io.capture_reader import TURN, read_capture, sample_folder
+from hairkit.io.capture_reader import TURN, read_capture, read_files, sample_folder
 from hairkit.io.capture_toml import ViewEntry, read_capture_file, write_view_entries
 from hairkit.io.photos import focal_from_equivalent
 from hairkit.testing import striped_view
@@ -225,6 +225,25 @@ def test_one_photo_is_a_capture(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("hello")
     with pytest.raises(InputError, match=r"notes\.txt: expected a JPEG"):
         read_capture(tmp_path / "notes.txt")
+
+
+def test_photos_that_lie_anywhere_are_a_capture(tmp_path: Path) -> None:
+    """Files that are given one by one are views in their order, or as their names say."""
+    for folder, grey in (("a", 1), ("b", 2)):
+        (tmp_path / folder).mkdir()
+        write_grey(tmp_path / folder / "IMG_1.png", np.full((30, 20), grey, np.uint8))
+        write_grey(tmp_path / folder / "left.png", np.full((30, 20), grey, np.uint8))
+    capture = read_files([tmp_path / "b" / "IMG_1.png", tmp_path / "a" / "IMG_1.png"])
+    assert [int(view.image[0, 0, 0]) for view in capture.views] == [2, 1]
+    assert len({view.name for view in capture.views}) == 2
+    assert read_files([tmp_path / "b" / "left.png"]).views[0].azimuth_deg == 90
+    for wrong, words in (
+        ([tmp_path / "b" / "left.png", tmp_path / "a" / "left.png"], "two photos of the view"),
+        ([tmp_path / "b" / "left.png", tmp_path / "b"], "no such photo"),
+        ([tmp_path / "a" / "IMG_1.png"] * 37, "expected 1 to 36"),
+    ):
+        with pytest.raises(InputError, match=words):
+            read_files(wrong)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 5, 12, 36])
