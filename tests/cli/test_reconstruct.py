@@ -119,7 +119,7 @@ WRONG = {
     "0 guides, expected 1": (None, ["--guides", "0"]),
     "invalid int value: 'many'": (None, ["--guides", "many"]),
     "--max-edge is 3": (None, ["--max-edge", "3"]),
-    "either a folder of photos or --sample": (None, ["--sample"]),
+    "either photos or --sample": (None, ["--sample"]),
     "none.py: no such file": (None, ["--plugin", "none.py"]),
     "not a folder": (lambda f: (f.parent / "out").write_text("mine"), []),
     "did you mean '--guides'": (None, ["--guide", "3"]),
