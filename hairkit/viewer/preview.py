@@ -226,8 +226,12 @@ class Preview:
         lines: list[tuple[LineSet, bool]] = []
         if session.shown.colours not in ("hair", "direction"):
             rest = session.body.guide_rest
-            confidence = session.layers.confidence(rest)
-            values = point_values(session.shown.colours, rows, rest, confidence)
+            given = session.layers.confidence(rest)
+            if session.shown.colours == "group":
+                group = session.body.guides.group
+                other = np.zeros(len(rest)) if group is None else np.minimum(group, 1)
+                given = np.repeat(0.5 + 0.5 * other[:, None], rest.shape[1], axis=1)
+            values = point_values(session.shown.colours, rows, rest, given)
             lines.append((_guide_lines(rows, ramp(values)), True))
         if session.picked is not None:
             one = rows[session.picked : session.picked + 1]

@@ -239,7 +239,7 @@ def guides(session: Session, only: bool | None = None) -> None:
 
 @action(D={})
 def colours(session: Session, by: str = "") -> None:
-    """Colour by hair, direction, length, stretch, curvature or confidence."""
+    """Colour by hair, direction, length, stretch, curvature, group or confidence."""
     if by and by not in COLOURINGS:
         raise InputError(unknown_name("colouring", by, COLOURINGS))
     known = COLOURINGS if session.layers.has_confidence else COLOURINGS[:-1]

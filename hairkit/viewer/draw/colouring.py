@@ -1,4 +1,4 @@
-"""Colour maps of guides: length, stretch, curvature or confidence."""
+"""Colour maps of guides: length, stretch, curvature, group or confidence."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float32Array
 
-COLOURINGS = ("hair", "direction", "length", "stretch", "curvature", "confidence")
+COLOURINGS = ("hair", "direction", "length", "stretch", "curvature", "group", "confidence")
 """`hair` and `direction` apply to all hair, the others to guides."""
 FULL_STRETCH = 0.02
 """Relative change of length shown in full red (longer) or blue (shorter)."""
@@ -35,9 +35,12 @@ def ramp(values: npt.ArrayLike) -> Float32Array:
 
 
 def point_values(
-    by: str, rows: Float32Array, rest: Float32Array, confidence: Float32Array | None
+    by: str, rows: Float32Array, rest: Float32Array, given: Float32Array | None
 ) -> Float32Array:
-    """Return values (G, m) in [0, 1] of guides at `rows` (G, m, 3), whose rest is `rest`."""
+    """Return values (G, m) in [0, 1] of guides at `rows` (G, m, 3), whose rest is `rest`.
+
+    Groups and confidence are `given`.
+    """
     step, was = np.diff(rows, axis=1), np.diff(rest, axis=1)
     length, before = np.linalg.norm(step, axis=2), np.linalg.norm(was, axis=2)
     if by == "stretch":
@@ -46,8 +49,8 @@ def point_values(
     if by == "curvature":
         bent = _curvatures(rows)
         return np.asarray(bent / _curvature_scale(bent), np.float32)
-    if by == "confidence" and confidence is not None:
-        return confidence
+    if by in ("group", "confidence") and given is not None:
+        return given
     whole = before.sum(axis=1, keepdims=True)
     share = whole / max(float(whole.max()), 1e-9)
     return np.repeat(share, rows.shape[1], axis=1).astype(np.float32)
@@ -64,6 +67,8 @@ def legend(by: str, rows: Float32Array, rest: Float32Array) -> str:
         return f"stretch, blue -{100 * FULL_STRETCH:g} %, green 0, red +{100 * FULL_STRETCH:g} %"
     if by == "curvature":
         return f"curvature, blue 0 to red {_curvature_scale(_curvatures(rows)):.0f} 1/m"
+    if by == "group":
+        return "group, green 0 (seen in photos), red others (continued, where photos were few)"
     return "confidence, blue 0 to red 1" if by == "confidence" else ""
 
 
