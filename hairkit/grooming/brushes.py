@@ -228,9 +228,10 @@ def brush_strands(
 
     Raises `InputError` for a brush that there is not.
     """
-    for edit in edits.strokes:
-        if edit.setting.brush not in brushes:
-            raise InputError(unknown_name("brush", edit.setting.brush, brushes))
+    for number, edit in enumerate(edits.strokes, start=1):
+        name = edit.setting.brush
+        if name not in brushes:
+            raise InputError(f"stroke {number}: {unknown_name('brush', name, brushes)}")
     if not edits or not len(strands):
         return strands, (False,) * len(edits.strokes)
     most = max(int(strands.counts.max()), 2)

@@ -9,6 +9,7 @@ plugins.
 * `find_views`: faces, persons, and from where each photo was taken
 * `drawn_hair`: guides against the photos themselves
 * `findings`: the walk through the stages
+* `found`: properties that are made once
 * `head_alone`: the head with its skin, without hair
 * `health`: figures that tell how good a run is
 * `judge_turn`: arrangements of the photos judged by their cameras

@@ -26,7 +26,8 @@ from hairkit.io.strokes import read_view_strokes
 from hairkit.manager import Manager
 from hairkit.parallel import one_blas_thread
 from hairkit.pipeline.find_views import frame_photos
-from hairkit.pipeline.findings import Findings, found
+from hairkit.pipeline.findings import Findings
+from hairkit.pipeline.found import found
 from hairkit.pipeline.recipe import Recipe
 from hairkit.pipeline.run_log import RunLog
 from hairkit.pipeline.single_photo import SeenPhoto, see_photo

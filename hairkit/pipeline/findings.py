@@ -7,10 +7,9 @@ orientations. Each property names what it is made from; `hairkit.stages` has the
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import fields, replace
-from typing import Any, Generic, TypeVar
+from typing import Any
 
 from hairkit.cameras.similarity import move_head
 from hairkit.field.find_parting import measure_parting
@@ -25,6 +24,7 @@ from hairkit.head_model.template import default_head
 from hairkit.imaging.waves import measure_waves
 from hairkit.io.head_reader import HeadFile
 from hairkit.pipeline.find_views import find_views
+from hairkit.pipeline.found import Found, found, result_of
 from hairkit.pipeline.judge_turn import judge_turn
 from hairkit.pipeline.own_head import mark_head
 from hairkit.pipeline.stage_runner import (
@@ -74,37 +74,6 @@ from hairkit.types.tie import TiedHair
 from hairkit.types.turnaround import Turnaround
 from hairkit.types.volume import Hull, OrientationField, ScalpDistance
 from hairkit.types.waves import Waves
-
-_Value = TypeVar("_Value")
-
-
-class Found(Generic[_Value]):
-    """A property that is made once, on the thread that first asks for it; others wait."""
-
-    def __init__(self, make: Callable[[Any], _Value], stage: Stage[Any] | None = None) -> None:
-        self._make, self._stage = make, stage
-
-    def __get__(self, owner: Findings, kind: type | None = None) -> _Value:
-        with owner.guard:
-            first = self not in owner.made
-            made: Future[_Value] = owner.made.setdefault(self, Future())
-        if first:
-            try:
-                kept = None if self._stage is None else owner.kept(self._stage)
-                made.set_result(self._make(owner) if kept is None else kept)
-            except BaseException as error:
-                made.set_exception(error)
-        return made.result()
-
-
-def found(make: Callable[[Any], _Value]) -> Found[_Value]:
-    """Make a method a property that is made once."""
-    return Found(make)
-
-
-def result_of(stage: Stage[Any]) -> Callable[[Callable[[Any], _Value]], Found[_Value]]:
-    """Make a method a property that is made once, the result of a stage."""
-    return lambda make: Found(make, stage)
 
 
 class Findings:
@@ -193,8 +162,8 @@ class Findings:
         if self.turn is None or likeliest is None or not likeliest.value.others:
             return self.run.every_view(LABELS, [given_photo(view) for view in views])
         labels = [self.photo_labels[i] for i in self.turn.order]
-        for view, found in zip(views, labels, strict=True):
-            self.run.keep(LABELS, found.result(), view.name)
+        for view, label in zip(views, labels, strict=True):
+            self.run.keep(LABELS, label.result(), view.name)
         return labels
 
     @found
@@ -374,10 +343,18 @@ class Findings:
 
     @found
     def groom(self) -> Groom:
+        """The groom with what was drawn on it by hand."""
+        edited, tracked = self.edited, self.tracked
+        if edited is self.strands:
+            return tracked
+        return replace(tracked, strands=replace(edited.value, group=tracked.strands.group))
+
+    @found
+    def tracked(self) -> Groom:
         """The strands on the head with its skin, their colours from the photos."""
         _ = self.view_orientations, self.scene  # what runs beside waits for no task behind it
         skin = self.run.beside(lambda: self.skin)  # strands need none of it
-        evidence, strands = self.evidence.value, self.edited.value
+        evidence, strands = self.evidence.value, self.strands.value
         return assemble_groom(
             self.capture.views, evidence.masks, replace(self.grown_head, maps=skin.result()),
             self.roots.value, group_seen(strands, evidence), evidence.waves, evidence.tied,

@@ -197,7 +197,7 @@ def _make(findings: Findings) -> _Made:
     findings.run.beside(lambda: findings.own_head)  # while networks look at the photos
     capture, groom = findings.capture, findings.groom
     evidence = findings.evidence.value
-    health = assess(capture, evidence, groom, findings.guides, findings.turn)
+    health = assess(capture, evidence, findings.tracked, findings.guides, findings.turn)
     few = tuple(_thinned(found) for found in evidence.orientations)
     return _Made(capture, replace(evidence, orientations=few), groom, health)
 

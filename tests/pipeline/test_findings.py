@@ -25,7 +25,8 @@ from hairkit.io.capture_reader import read_capture, sample_folder
 from hairkit.manager import Manager
 from hairkit.parallel import one_blas_thread, thread_count
 from hairkit.pipeline import findings as module
-from hairkit.pipeline.findings import Findings, found
+from hairkit.pipeline.findings import Findings
+from hairkit.pipeline.found import found
 from hairkit.pipeline.recipe import Recipe, load_recipe, parse_recipe
 from hairkit.pipeline.run_log import RunLog
 from hairkit.pipeline.stage_runner import StageRunner

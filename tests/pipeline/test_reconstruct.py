@@ -65,6 +65,11 @@ def files(out: Path) -> dict[str, bytes]:
     return {p.name: p.read_bytes() for p in out.iterdir() if p.is_file() and p.name not in timed}
 
 
+def figures(out: Path) -> list[tuple[str, float]]:
+    """Return the figures of health of a run."""
+    return [(figure.name, figure.value) for figure in read_record(out / RECORD).health]
+
+
 def test_strokes_are_done_again_and_can_be_left_out(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -77,6 +82,8 @@ def test_strokes_are_done_again_and_can_be_left_out(
     made = run(tmp_path / "out", "edit=brushes", **given).strands
     np.testing.assert_allclose(made.lengths(), 0.01, rtol=1e-3)
     assert "stroke 2 (comb) reaches no hair; it is kept" in caplog.text
+    same, told = (figures(tmp_path / name) for name in ("plain", "out"))
+    assert told == same  # photos judge what was made of them, not what was drawn over it
     assert ran(tmp_path / "out", "edit=brushes", **given) == ["export"]
     without = run(tmp_path / "out", "edit=none", **given).strands
     np.testing.assert_array_equal(without.points, plain.points)
