@@ -4,7 +4,7 @@ import {
 } from "./api.js";
 import { thumbnail } from "./photo_stage.js";
 
-const LEAST_PHOTOS = 1;
+const LEAST_PHOTOS = 1, MEANWHILE = 6; // photos from which hair can be, and is, made
 const VIDEO = /^video\//;
 let advice = {};
 
@@ -91,10 +91,10 @@ class PhotosPage {
     this.title.textContent = count ? "Add more photos" : "Photos from all around a head";
     refill(this.list, ...state.photos.map((photo) => card(photo)));
     const enough = count >= LEAST_PHOTOS;
-    const text = enough
-      ? `${count === 1 ? "1 photo" : `${count} photos`}. The hair is made by itself; `
-        + "correct a mask only where it is wrong."
-      : `${count} of at least ${LEAST_PHOTOS} photos`;
+    const photos = count === 1 ? "1 photo" : `${count} photos`;
+    const text = count >= MEANWHILE
+      ? `${photos}. The hair is made by itself; correct a mask only where it is wrong.`
+      : `${photos}. More of them make the hair better; hair that none shows is made up.`;
     refill(this.next, make("p", { class: "quiet" }, count ? text : ""), enough ? onward() : null);
   }
 }
