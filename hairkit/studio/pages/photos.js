@@ -94,7 +94,7 @@ class PhotosPage {
     const photos = count === 1 ? "1 photo" : `${count} photos`;
     const text = count >= MEANWHILE
       ? `${photos}. The hair is made by itself; correct a mask only where it is wrong.`
-      : `${photos}. More of them make the hair better; hair that none shows is made up.`;
+      : `${photos}. More of them make the hair better.`;
     refill(this.next, make("p", { class: "quiet" }, count ? text : ""), enough ? onward() : null);
   }
 }
