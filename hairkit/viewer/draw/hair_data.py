@@ -11,6 +11,7 @@ from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array
 from hairkit.errors import InputError
 from hairkit.grooming.densify import densify, roots_between
 from hairkit.grooming.guide_weights import closest_guides, guide_mask
+from hairkit.grooming.locks import strand_widths
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
@@ -20,8 +21,6 @@ TOLERANCE = 8e-4
 """Allowed RMS distance between guides and drawn strands, metres."""
 COUNTS, POWERS = (8, 10, 12, 14, 16, 20, 24, 32, 48), (1.0, 1.5, 2.0)
 """Point counts tried, and exponents of their density towards the root, where hair bends most."""
-TAPER = 0.7
-"""Share of its width that a strand loses towards the tip, so that locks do not end bluntly."""
 TUFT = 8
 """Neighbouring strands that stay adjacent in the order of drawing."""
 BITS = 10
@@ -93,8 +92,7 @@ class HairBody:
         mix = closest_guides(Strands(points, np.arange(count + 1) * len(shares), guide=marked))
         roots = np.einsum("sk,skc->sc", mix.weights, rest[:, 0][mix.guides])
         edges = np.diff(shape, axis=1, prepend=roots[:, None])
-        taper = (1 - TAPER * shares**4).astype(np.float32)
-        widths = np.tile(np.float32(groom.material.width) * taper, (count, 1))
+        widths = strand_widths(count, shares, groom.material.width)
         return cls(guides, shares, rest, mix.guides, mix.weights, edges, widths)
 
 
