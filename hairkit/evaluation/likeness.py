@@ -23,8 +23,9 @@ GRADIENT, WINDOW = 1.0, 4.0
 """Gaussians of the gradient and of the mean of the structure tensor, pixels."""
 MEASURES = ("brightness", "chroma", "fine contrast", "contrast of wisps", "contrast of locks",
             "coherence")  # fmt: skip
-"""Mean luma; mean CIELAB chroma; deviation of luma between each Gaussian and one twice as wide, over
-its mean; mean coherence of directions (Bigun and Granlund 1987), 0 to 1."""
+"""Mean luma; then medians, which skin and backdrop beside the hair hardly move: CIELAB chroma;
+difference of luma between each Gaussian and one twice as wide, over mean luma; coherence of
+directions (Bigun and Granlund 1987), 0 to 1."""
 
 
 def likeness(
@@ -69,11 +70,11 @@ def measure(picture: UInt8Array, mask: BoolArray) -> Float64Array:
         return np.ones(len(MEASURES))
     rgb = cv2.resize(picture, size, interpolation=cv2.INTER_AREA).astype(np.float32) / 255
     luma, weight = np.asarray(rgb @ LUMA, np.float32), inside.astype(np.float32)
-    chroma = np.linalg.norm(cv2.cvtColor(rgb, cv2.COLOR_RGB2LAB)[inside, 1:], axis=1).mean()
+    chroma = np.linalg.norm(cv2.cvtColor(rgb, cv2.COLOR_RGB2LAB)[inside, 1:], axis=1)
     bands = [_smooth(luma, weight, scale) - _smooth(luma, weight, 2 * scale) for scale in SCALES]
     mean = luma[inside].mean()
-    contrasts = [band[inside].std() / max(mean, 1e-3) for band in bands]
-    found = (mean, chroma, *contrasts, _coherence(luma, weight)[inside].mean())
+    contrasts = [np.median(abs(band[inside])) / max(mean, 1e-3) for band in bands]
+    found = (mean, np.median(chroma), *contrasts, np.median(_coherence(luma, weight)[inside]))
     return np.maximum(np.array(found, np.float64), 1e-3)
 
 

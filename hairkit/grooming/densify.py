@@ -238,11 +238,12 @@ def _lay_in_locks(
     wisps, waves = _wisps(bundle, locks)
     cells = np.floor(bundle.roots / locks.lock).astype(np.int64)
     middles = wisps[np.unique(cells, axis=0, return_index=True)[1]]
-    wisps = gather(wisps, middles, locks.lock, np.full(len(wisps), locks.gathered, np.float32))[0]
+    to_lock, to_wisp = locks.gathered
+    wisps = gather(wisps, middles, locks.lock, np.full(len(wisps), to_lock, np.float32))[0]
     stray = generator.random(len(course)) < locks.stray
-    hold = locks.gathered * (1 - generator.random(len(course), dtype=np.float32) ** 2) * ~stray
-    course = gather(course, middles, locks.lock, hold)[0]
-    course, which = gather(course, wisps, locks.wisp, hold)
+    hold = (1 - generator.random(len(course), dtype=np.float32) ** 2) * ~stray
+    course = gather(course, middles, locks.lock, to_lock * hold)[0]
+    course, which = gather(course, wisps, locks.wisp, to_wisp * hold)
     course += waves[which] * generator.uniform(*locks.curl, (len(course), 1, 1)).astype(np.float32)
     course += wander(course, locks, stray, generator)
     return cut_strands(course, 1 - locks.uneven * generator.random(len(course)) ** 2)

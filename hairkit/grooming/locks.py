@@ -19,10 +19,11 @@ CANDIDATES = 6
 """Middles near a strand's root among which the one that runs most alike is taken."""
 SWING = 0.4
 """Slow swing of a strand about its own line, in shares of the tip's wander."""
-STRAYING = 6.0
+STRAYING = 9.0
 """Wander of stray hairs over that of others."""
-MOST_WANDER = 0.15
-"""Wander of the tip, in shares of the strand's extent, at most."""
+MOST_WANDER, MOST_PULL = 0.2, 0.12
+"""Wander of a tip, and its way to the middle of its lock, in shares of the strand's extent at most:
+locks of short hair are small."""
 TAPER = 0.7
 """Share of its width that a strand loses towards the tip."""
 LEAST_WIDTH, WIDTHS = 0.7, 0.6
@@ -37,18 +38,21 @@ class Locks:
 
     lock: float = option(0.016, low=0.002, high=0.1, unit="m", doc="Spacing of locks at the scalp.")
     wisp: float = option(0.005, low=0.002, high=0.1, unit="m", doc="Spacing of wisps in a lock.")
-    gathered: float = option(
-        0.6, low=0, high=1, doc="Share of the way from a tip to the middle of its lock, at most."
+    gathered: tuple[float, float] = option(
+        (0.4, 0.6),
+        low=0,
+        high=1,
+        doc="Share of the way from a tip to the middle of its lock, and of its wisp, at most.",
     )
     stray: float = option(0.05, low=0, high=1, doc="Share of hairs that keep out of locks.")
     scatter: float = option(
-        0.0012, low=0, high=0.05, unit="m", doc="Root mean square wander of a tip."
+        0.0016, low=0, high=0.05, unit="m", doc="Root mean square wander of a tip."
     )
     uneven: float = option(
         0.3, low=0, high=0.9, doc="Share of its length that a strand may lack, most lack little."
     )
     curl: tuple[float, float] = option(
-        (0.7, 1.3), low=0, high=3, doc="Range of a strand's waves over those of its guide."
+        (0.6, 1.4), low=0, high=3, doc="Range of a strand's waves over those of its guide."
     )
 
 
@@ -57,7 +61,7 @@ def gather(
 ) -> tuple[Float32Array, Int64Array]:
     """Return curves (N, m, 3) drawn to middles (C, m, 3), and the middle (N,) of each.
 
-    Roots stay. A tip goes the share `hold` (N,) of the way, and never further than `reach` metres.
+    Roots stay. A tip goes the share `hold` (N,) of the way, which counts as `reach` metres at most.
     """
     near = cKDTree(middles[:, 0]).query(curves[:, 0], k=min(CANDIDATES, len(middles)))[1]
     near = near.reshape(len(curves), -1)
@@ -67,8 +71,9 @@ def gather(
     which = np.take_along_axis(near, apart.argmin(axis=1)[:, None], 1)[:, 0]
     pull = middles[which] - curves
     far = np.sqrt(np.einsum("nmc,nmc->nm", pull, pull))
+    most = np.minimum(reach, MOST_PULL * _extents(curves))[:, None]
     t = np.linspace(0, 1, curves.shape[1], dtype=np.float32)
-    pull *= (hold[:, None] * t * (2 - t) * np.minimum(1, reach / np.maximum(far, 1e-9)))[..., None]
+    pull *= (hold[:, None] * t * (2 - t) * np.minimum(1, most / np.maximum(far, 1e-9)))[..., None]
     pull += curves
     return pull, which
 
@@ -98,10 +103,15 @@ def wander(
     drift -= 2 * inwards * out * stray[:, None]
     swing = np.sin(phase[:, :1] + 2 * np.pi * turns * t) - np.sin(phase[:, :1])
     offsets = t[None, :, None] * drift[:, None] + SWING * (t * swing)[:, :, None] * wave[:, None]
-    extent = np.linalg.norm(hair[:, -1] - hair[:, 0], axis=1)
-    size = np.minimum(locks.scatter * np.where(stray, STRAYING, 1), MOST_WANDER * extent)
+    wide = locks.scatter * np.where(stray, STRAYING, 1)
+    size = np.minimum(wide, MOST_WANDER * _extents(hair))
     result: Float32Array = (size / np.sqrt(3)).astype(np.float32)[:, None, None] * offsets
     return result
+
+
+def _extents(curves: Float32Array) -> Float32Array:
+    """Return the distances (N,) from roots to tips, metres."""
+    return np.asarray(np.linalg.norm(curves[:, -1] - curves[:, 0], axis=1), np.float32)
 
 
 def cut_strands(hair: Float32Array, shares: Float64Array) -> Float32Array:
