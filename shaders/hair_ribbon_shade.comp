@@ -1,6 +1,7 @@
 #version 430
 // Shapes ribbons and shades their points.
 #include "ribbon_shape.glsl"
+#include "light_volume.glsl"
 #include "hair_colour.glsl"
 
 void main() {

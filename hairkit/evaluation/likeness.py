@@ -10,6 +10,7 @@ import numpy as np
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, UInt8Array
 from hairkit.errors import RenderError
 from hairkit.grooming.densify import densify
+from hairkit.pipeline.drawn_hair import FINER, photo_directions
 from hairkit.types.camera import Camera
 from hairkit.types.groom import Groom
 
@@ -19,10 +20,7 @@ LUMA = np.array([0.2126, 0.7152, 0.0722], np.float32)
 """Weights of red, green and blue (Rec. ITU-R BT.709)."""
 SCALES = (1.0, 3.0, 9.0)
 """Gaussians about which contrast is measured, pixels: strands, wisps and locks of a whole head."""
-GRADIENT, WINDOW = 1.0, 4.0
-"""Gaussians of the gradient and of the mean of the structure tensor, pixels."""
-MEASURES = ("brightness", "chroma", "fine contrast", "contrast of wisps", "contrast of locks",
-            "coherence")  # fmt: skip
+MEASURES = ("brightness", "chroma", *(f"contrast at {s:g} px" for s in SCALES), "coherence")
 """Mean luma; then medians, which skin and backdrop beside the hair hardly move: CIELAB chroma;
 difference of luma between each Gaussian and one twice as wide, over mean luma; coherence of
 directions (Bigun and Granlund 1987), 0 to 1."""
@@ -74,7 +72,10 @@ def measure(picture: UInt8Array, mask: BoolArray) -> Float64Array:
     bands = [_smooth(luma, weight, scale) - _smooth(luma, weight, 2 * scale) for scale in SCALES]
     mean = luma[inside].mean()
     contrasts = [np.median(abs(band[inside])) / max(mean, 1e-3) for band in bands]
-    found = (mean, np.median(chroma), *contrasts, np.median(_coherence(luma, weight)[inside]))
+    coarse = (size[0] // FINER, size[1] // FINER)
+    sure = photo_directions(picture, mask.astype(np.uint8), coarse)[1]
+    coherence = np.median(cv2.resize(sure, size, interpolation=cv2.INTER_NEAREST)[inside])
+    found = (mean, np.median(chroma), *contrasts, coherence)
     return np.maximum(np.array(found, np.float64), 1e-3)
 
 
@@ -82,11 +83,3 @@ def _smooth(values: Float32Array, weight: Float32Array, sigma: float) -> Float32
     """Return values (H, W) smoothed inside the mask, which holds what lies beyond it away."""
     over = cv2.GaussianBlur(weight, (0, 0), sigma)
     return np.asarray(cv2.GaussianBlur(values * weight, (0, 0), sigma) / np.maximum(over, 1e-6))
-
-
-def _coherence(luma: Float32Array, weight: Float32Array) -> Float32Array:
-    """Return (H, W) how far brightness changes in one direction only, 1, and not in all, 0."""
-    fine = _smooth(luma, weight, GRADIENT)
-    dy, dx = (change * weight for change in np.gradient(fine))
-    xx, yy, xy = (_smooth(v, weight, WINDOW) for v in (dx * dx, dy * dy, dx * dy))
-    return np.asarray(np.hypot(xx - yy, 2 * xy) / np.maximum(xx + yy, 1e-9), np.float32)

@@ -29,7 +29,7 @@ BACKDROP_TOP, BACKDROP_BOTTOM = (176, 180, 184), (214, 216, 218)
 """sRGB of the neutral backdrop."""
 HEAD_PUSH = 0.0015
 """Meshes are drawn this far behind their surface, metres, so that they do not hide roots."""
-SHOWN_HAIRS = 40_000
+SHOWN_HAIRS = 60_000
 """Fewer strands are drawn wider, so that they cover the head as this many would."""
 WIDEST = 4.0
 """Largest factor of that widening."""

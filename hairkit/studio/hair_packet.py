@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import struct
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +19,12 @@ from scipy.spatial import cKDTree
 
 from hairkit.arrays import UInt8Array
 from hairkit.grooming.densify import densify
+from hairkit.grooming.locks import TAPER
 from hairkit.imaging.picture_file import encode_picture
+from hairkit.rendering.context import shader_source
 from hairkit.rendering.head import Solid, bust_solid, head_solid
+from hairkit.rendering.light import EXPOSURE, Lights, hair_density, light_volume
+from hairkit.rendering.picture import display_width
 from hairkit.storage import write_bytes
 from hairkit.types.groom import Groom
 from hairkit.types.head import Head, Roots
@@ -33,6 +38,10 @@ CARRIERS = 3
 """Guides that each hair follows."""
 SKIN_EDGE, SKIN_QUALITY = 1024, 85
 """Longest edge in pixels, and JPEG quality, of the picture of the skin: about 100 kB."""
+LIGHT_CELL = 0.006
+"""Edge of a cell of the light through the hair, metres: about 1 MB."""
+LIGHTS = Lights.studio((0.5, 0.6, 0.75), (-0.55, 0.6, -0.55), EXPOSURE)
+"""Key light in front on the subject's left, rim light behind: they stay when the view turns."""
 LEAST_DISTANCE = 1e-3
 """Added to distances between roots, metres, before weights are taken as their inverse."""
 
@@ -51,9 +60,11 @@ def packet_of(groom: Groom, roots: Roots | None = None) -> bytes:
     shape = (-1, POINTS, 3)
     carried, weights = _carriers(guides.points.reshape(shape), hair.points.reshape(shape))
     head = groom.head
-    bust = bust_solid(head, strands)
+    own, bust = head_solid(head, groom.material), bust_solid(head, strands)
+    solids = [own, *([] if bust is None else [bust])]
+    light = light_volume(hair_density(hair, solids, LIGHT_CELL), LIGHTS)
     arrays: dict[str, npt.NDArray[Any]] = {
-        **_mesh("head", head_solid(head, groom.material)),
+        **_mesh("head", own),
         "head_scalp": head.scalp.astype(np.float32),
         "head_eyes": _on_eyes(head),
         **({} if bust is None else _mesh("bust", bust)),
@@ -65,10 +76,18 @@ def packet_of(groom: Groom, roots: Roots | None = None) -> bytes:
             [head.capsules.first, head.capsules.second, head.capsules.radius]
         ).astype(np.float32),
         **_skin(head),
+        "light": np.rint(255 * light.transmittance.transpose(2, 1, 0, 3)).astype(np.uint8),
     }
     facts = {
-        "root_colour": groom.material.root_colour.tolist(),
-        "tip_colour": groom.material.tip_colour.tolist(),
+        "shading": shader_source("light_volume.glsl") + shader_source("hair_colour.glsl"),
+        "look": {
+            **LIGHTS.uniforms(),
+            **light.uniforms(),
+            "u_root_colour": groom.material.root_colour.tolist(),
+            "u_tip_colour": groom.material.tip_colour.tolist(),
+            "u_width": float(display_width(replace(hair, widths=None), groom.material)),
+            "u_taper": TAPER,
+        },
         "stiffness": groom.physics.stiffness,
         "strands": len(strands),
     }

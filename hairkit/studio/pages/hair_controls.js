@@ -13,7 +13,7 @@ const HAIR_LABEL = "Hair on a head. Arrow keys turn it, plus and minus zoom, W i
 // Shows hair in an element of the page; returns what ends that.
 export function showHair(stage, buffer) {
   const controls = new HairControls(stage, readPacket(buffer));
-  stage.hairMotion = controls.motion; // for scripts that measure the motion
+  [stage.hairMotion, stage.hairView] = [controls.motion, controls.view]; // for scripts that measure
   return () => controls.close();
 }
 

@@ -16,7 +16,6 @@ from hairkit.viewer.draw.hair_data import (
     COUNTS,
     HairBody,
     choose_shares,
-    sample_guides,
     split_guides,
 )
 
@@ -61,7 +60,7 @@ def test_sampled_guides_keep_roots_tips_and_widths() -> None:
     bristles = bristle_groom().strands
     strands = replace(bristles, widths=bristles.arc_lengths().astype(np.float32))
     shares = np.linspace(0, 1, 9) ** 1.5
-    sampled = sample_guides(strands, shares)
+    sampled = strands.resampled_at(shares)
     assert (sampled.counts == 9).all()
     np.testing.assert_allclose(sampled.roots, strands.roots, atol=1e-7)
     np.testing.assert_allclose(sampled.tips, strands.tips, atol=1e-7)
