@@ -95,7 +95,7 @@ class Evaluation:
     mask_views: tuple[float, ...] | None
     """Intersection over union of the hair masks; None when they were not given."""
     likeness_views: Float64Array | None
-    """(V, 6) `MEASURES` of the drawn hair over those of the photos; None without photos or OpenGL."""
+    """(V, 6) `MEASURES` of drawn hair over those of photos; None without photos or OpenGL."""
     consistency: float | None
     """Share of a true strand that one predicted strand follows; None when not asked for."""
     evidence: Evidence

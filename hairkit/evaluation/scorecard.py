@@ -78,14 +78,14 @@ def _view_figures(evaluation: Evaluation) -> tuple[Figure, ...]:
     apart = 1000 * float(np.mean([camera.position_m for camera in cameras]))
     lower, overlap = "lower is better", "higher is better, 1 is best"
     orientation, azimuth = evaluation.orientation_deg, evaluation.azimuth_error_deg
-    scale, alike = 1 / evaluation.similarity.scale, evaluation.likeness
+    scale, alike = 1 / evaluation.similarity.scale, evaluation.likeness or {}
     return (
         Figure("drawn direction within 20 deg", share, " %", 1, "higher is better, 100 is best"),
         Figure("silhouette IoU", evaluation.silhouette, "", 3, overlap),
         Figure("2D orientation error", orientation, " deg", 1, f"{lower}, guessing gives 45"),
         Figure("hair mask IoU", evaluation.mask_iou, "", 3, overlap),
         *(
-            Figure(f"{name} / photo", alike and alike[name], "", 2, "1 is best: of the drawn hair")
+            Figure(f"{name} / photo", alike.get(name), "", 2, "1 is best: of the drawn hair")
             for name in MEASURES
         ),
         Figure("metric scale / true", scale, "", 3, "1 is best: scores are of the groom so scaled"),

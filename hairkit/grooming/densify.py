@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.errors import InputError
-from hairkit.grooming.locks import Locks, cut_strands, gather, strand_widths, turn_about, wander
+from hairkit.grooming.locks import LockOptions, gather, strand_widths, turn_about, wander
 from hairkit.head_model.scalp import roots_at, sample_roots
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.head import Roots
@@ -52,7 +52,7 @@ def densify(
     seed: int = 0,
     *,
     roots: Roots | npt.ArrayLike | None = None,
-    locks: Locks | None = Locks(),  # noqa: B008 (frozen)
+    locks: LockOptions | None = LockOptions(),  # noqa: B008 (frozen)
     material: HairMaterial | None = None,
 ) -> Strands:
     """Return `count` strands: the guides first, then hair interpolated between them.
@@ -232,24 +232,27 @@ def _shape_lengths(shapes: Float32Array) -> Float64Array:
 
 
 def _lay_in_locks(
-    bundle: _Bundle, course: Float32Array, locks: Locks, generator: np.random.Generator
+    bundle: _Bundle, course: Float32Array, locks: LockOptions, generator: np.random.Generator
 ) -> Float32Array:
     """Return hair (N, m, 3) that follows its course (N, m, 3) in wisps, and these in locks."""
     wisps, waves = _wisps(bundle, locks)
     cells = np.floor(bundle.roots / locks.lock).astype(np.int64)
     middles = wisps[np.unique(cells, axis=0, return_index=True)[1]]
-    to_lock, to_wisp = locks.gathered
-    wisps = gather(wisps, middles, locks.lock, np.full(len(wisps), to_lock, np.float32))[0]
+    wisps = gather(wisps, middles, locks.lock, np.full(len(wisps), locks.to_lock, np.float32))[0]
     stray = generator.random(len(course)) < locks.stray
     hold = (1 - generator.random(len(course), dtype=np.float32) ** 2) * ~stray
-    course = gather(course, middles, locks.lock, to_lock * hold)[0]
-    course, which = gather(course, wisps, locks.wisp, to_wisp * hold)
-    course += waves[which] * generator.uniform(*locks.curl, (len(course), 1, 1)).astype(np.float32)
+    course = gather(course, middles, locks.lock, locks.to_lock * hold)[0]
+    course, which = gather(course, wisps, locks.wisp, locks.to_wisp * hold)
+    curl = 1 + locks.curl * generator.uniform(-1, 1, (len(course), 1, 1)).astype(np.float32)
+    course += waves[which] * curl
     course += wander(course, locks, stray, generator)
-    return cut_strands(course, 1 - locks.uneven * generator.random(len(course)) ** 2)
+    count, points = course.shape[:2]
+    ends = 1 - locks.uneven * generator.random((count, 1)) ** 2
+    made = Strands(course.reshape(-1, 3), np.arange(count + 1) * points)
+    return made.resampled_at(ends * np.linspace(0, 1, points)).points.reshape(course.shape)
 
 
-def _wisps(bundle: _Bundle, locks: Locks) -> tuple[Float32Array, Float32Array]:
+def _wisps(bundle: _Bundle, locks: LockOptions) -> tuple[Float32Array, Float32Array]:
     """Return courses (W, m, 3) and waves (W, m, 3) of wisps: the guides, then others between them.
 
     They depend on the guides alone, so that hair of any count and seed lies in the same locks.

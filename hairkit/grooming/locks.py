@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array, unit_vectors
 from hairkit.options import option
 
 CANDIDATES = 6
@@ -33,27 +33,17 @@ _WIDTH_STEP = 0.7548776662466927
 
 
 @dataclass(frozen=True)
-class Locks:
+class LockOptions:
     """How hair departs from a plain mixture of its guides."""
 
     lock: float = option(0.016, low=0.002, high=0.1, unit="m", doc="Spacing of locks at the scalp.")
     wisp: float = option(0.005, low=0.002, high=0.1, unit="m", doc="Spacing of wisps in a lock.")
-    gathered: tuple[float, float] = option(
-        (0.4, 0.6),
-        low=0,
-        high=1,
-        doc="Share of the way from a tip to the middle of its lock, and of its wisp, at most.",
-    )
+    to_lock: float = option(0.4, low=0, high=1, doc="Way of tips to their lock's middle, a share.")
+    to_wisp: float = option(0.6, low=0, high=1, doc="Way of tips to their wisp's middle, a share.")
     stray: float = option(0.05, low=0, high=1, doc="Share of hairs that keep out of locks.")
-    scatter: float = option(
-        0.0016, low=0, high=0.05, unit="m", doc="Root mean square wander of a tip."
-    )
-    uneven: float = option(
-        0.3, low=0, high=0.9, doc="Share of its length that a strand may lack, most lack little."
-    )
-    curl: tuple[float, float] = option(
-        (0.6, 1.4), low=0, high=3, doc="Range of a strand's waves over those of its guide."
-    )
+    scatter: float = option(0.0016, low=0, high=0.05, unit="m", doc="RMS wander of a tip.")
+    uneven: float = option(0.3, low=0, high=0.9, doc="Share of its length that a strand may lack.")
+    curl: float = option(0.4, low=0, high=1, doc="Share by which waves differ from their guide's.")
 
 
 def gather(
@@ -80,51 +70,32 @@ def gather(
 
 def turn_about(vectors: Float32Array, axes: Float32Array, angles: Float64Array) -> Float32Array:
     """Return vectors (N, m, 3) turned by angles (N,) about axes (N, m, 3) of any length."""
-    unit = axes / np.maximum(np.linalg.norm(axes, axis=2, keepdims=True), 1e-12)
-    cosine, sine = np.cos(angles)[:, None, None], np.sin(angles)[:, None, None]
+    unit, angle = unit_vectors(axes), angles[:, None, None]
     along = unit * (unit * vectors).sum(axis=2, keepdims=True)
-    turned = cosine * (vectors - along) + sine * np.cross(unit, vectors) + along
+    turned = np.cos(angle) * (vectors - along) + np.sin(angle) * np.cross(unit, vectors) + along
     return np.asarray(turned, np.float32)
 
 
 def wander(
-    hair: Float32Array, locks: Locks, stray: BoolArray, generator: np.random.Generator
+    hair: Float32Array, locks: LockOptions, stray: BoolArray, generator: np.random.Generator
 ) -> Float32Array:
-    """Return (N, m, 3) slow random sideways offsets that are 0 at the root; strays lead outwards."""
+    """Return (N, m, 3) slow random offsets, 0 at the root; those of strays lead outwards."""
     count, points = hair.shape[:2]
     t = np.linspace(0, 1, points, dtype=np.float32)
-    phase = 2 * np.pi * generator.random((count, 2), dtype=np.float32)
-    turns = 1 + 2 * generator.random((count, 1), dtype=np.float32)
-    drift = generator.standard_normal((count, 3), dtype=np.float32)
-    wave = generator.standard_normal((count, 3), dtype=np.float32)
-    out = hair[:, 0] - hair.mean(axis=(0, 1))
-    out /= np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-9)
-    inwards = np.minimum((drift * out).sum(axis=1, keepdims=True), 0)
-    drift -= 2 * inwards * out * stray[:, None]
-    swing = np.sin(phase[:, :1] + 2 * np.pi * turns * t) - np.sin(phase[:, :1])
-    offsets = t[None, :, None] * drift[:, None] + SWING * (t * swing)[:, :, None] * wave[:, None]
-    wide = locks.scatter * np.where(stray, STRAYING, 1)
-    size = np.minimum(wide, MOST_WANDER * _extents(hair))
-    result: Float32Array = (size / np.sqrt(3)).astype(np.float32)[:, None, None] * offsets
-    return result
+    phase, turns = generator.random((2, count, 1), dtype=np.float32)
+    drift, wave = generator.standard_normal((2, count, 3), dtype=np.float32)
+    out = unit_vectors(hair[:, 0] - hair.mean(axis=(0, 1)))
+    drift -= 2 * np.minimum((drift * out).sum(axis=1), 0)[:, None] * out * stray[:, None]
+    swing = np.sin(2 * np.pi * (phase + (1 + 2 * turns) * t)) - np.sin(2 * np.pi * phase)
+    offsets = t[:, None] * drift[:, None] + SWING * (t * swing)[..., None] * wave[:, None]
+    wide = locks.scatter / np.sqrt(3) * np.where(stray, STRAYING, 1)
+    size = np.minimum(wide, MOST_WANDER * _extents(hair)).astype(np.float32)
+    return np.asarray(size[:, None, None] * offsets, np.float32)
 
 
 def _extents(curves: Float32Array) -> Float32Array:
     """Return the distances (N,) from roots to tips, metres."""
     return np.asarray(np.linalg.norm(curves[:, -1] - curves[:, 0], axis=1), np.float32)
-
-
-def cut_strands(hair: Float32Array, shares: Float64Array) -> Float32Array:
-    """Return strands (N, m, 3) that end at shares (N,) of their points, with as many points."""
-    last = hair.shape[1] - 1
-    place = (shares[:, None] * np.arange(last + 1)).astype(np.float32)
-    low = np.minimum(place.astype(np.int64), max(last - 1, 0))
-    before = np.take_along_axis(hair, low[..., None], 1)
-    after = np.take_along_axis(hair, low[..., None] + 1, 1)
-    after -= before
-    after *= (place - low)[..., None]
-    after += before
-    return after
 
 
 def strand_widths(count: int, shares: Float64Array, width: float) -> Float32Array:

@@ -151,8 +151,10 @@ class Strands(Previewed, Stored):
         return self._at(np.full(len(self), count))
 
     def resampled_at(self, shares: Float64Array) -> Strands:
-        """Return strands with points at ascending shares (m,) of their arc length, from 0 to 1."""
-        return self._at(np.full(len(self), len(shares)), np.tile(shares, len(self)))
+        """Return strands with points at rising shares (m,) or (S, m), 0 to 1, of their length."""
+        count = shares.shape[-1]
+        own = np.broadcast_to(shares, (len(self), count))
+        return self._at(np.full(len(self), count), own.ravel())
 
     def resampled_by_length(self, step: float) -> Strands:
         """Return strands with points about `step` metres apart, equal in a strand; ends stay."""
@@ -162,7 +164,7 @@ class Strands(Previewed, Stored):
 
     def _at(self, counts: Int64Array, shares: Float64Array | None = None) -> Strands:
         offsets = np.concatenate([[0], np.cumsum(counts)])
-        after, t = self._places(counts, shares)
+        after, t = self.places(counts, shares)
         points = _mix(self.points, after, t[:, None])
         widths = None if self.widths is None else _mix(self.widths, after, t)
         return replace(self, points=points, offsets=offsets, widths=widths)
@@ -172,15 +174,15 @@ class Strands(Previewed, Stored):
 
         The points are the same matter in every frame, wherever it has moved.
         """
-        after, t = self._places(np.full(len(self), count))
+        after, t = self.places(np.full(len(self), count))
         return _mix(frames.swapaxes(0, 1), after, t[:, None, None]).swapaxes(0, 1)
 
-    def _places(
+    def places(
         self, counts: Int64Array, shares: Float64Array | None = None
     ) -> tuple[Int64Array, Float64Array]:
         """Return the point after each new one, and how far on the new one lies between both.
 
-        New points are at `shares` of the arc length, None: equal in each strand.
+        There are `counts` (S,) of them, at `shares` of their strand's length; None: evenly spaced.
         """
         offsets = np.concatenate([[0], np.cumsum(counts)])
         arc = self.arc_lengths()
@@ -189,9 +191,8 @@ class Strands(Previewed, Stored):
             rank = np.arange(offsets[-1]) - np.repeat(offsets[:-1], counts)
             shares = rank / np.repeat(counts - 1, counts)
         wanted = shares * np.repeat(length, counts)
-        base = np.concatenate([[0.0], np.cumsum(length + 1.0)])[
-            :-1
-        ]  # a strictly ascending key over all strands
+        # a strictly ascending key over all strands
+        base = np.concatenate([[0.0], np.cumsum(length + 1.0)[:-1]])
         key = arc + np.repeat(base, self.counts)
         target = wanted + np.repeat(base, counts)
         after = np.clip(

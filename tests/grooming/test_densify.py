@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from hairkit.errors import InputError, OptionError
 from hairkit.grooming.densify import densify
-from hairkit.grooming.locks import TAPER, Locks
+from hairkit.grooming.locks import TAPER, LockOptions
 from hairkit.options import make_options
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import HairMaterial
@@ -122,8 +122,8 @@ def test_hair_gathers_in_locks_that_guides_alone_place() -> None:
     """Towards the tips hair of any seed is nearer to some wisp, roots stay, and tips are uneven."""
     guides, roots = curtain(), np.random.default_rng(0).uniform(-0.05, 0.05, (600, 3))
     roots[:, 1] = 0
-    straight = Locks(stray=0, scatter=0, uneven=0, gathered=(0, 0))
-    gathered = replace(straight, gathered=(0.9, 0.9), lock=0.03, wisp=0.01)
+    straight = LockOptions(stray=0, scatter=0, uneven=0, to_lock=0, to_wisp=0)
+    gathered = replace(straight, to_lock=0.9, to_wisp=0.9, lock=0.03, wisp=0.01)
     loose, tight = (
         densify(guides, 600 + len(guides), roots=roots, locks=locks).select(
             np.arange(len(guides), 600 + len(guides))
@@ -146,7 +146,7 @@ def test_stray_hairs_lead_outwards() -> None:
     groom = bristle_groom()
     count = len(groom.strands)
     plain, stray = (
-        densify(groom, count + 400, locks=Locks(stray=share, scatter=scatter, uneven=0))
+        densify(groom, count + 400, locks=LockOptions(stray=share, scatter=scatter, uneven=0))
         for share, scatter in ((0.0, 0.0), (1.0, 0.002))
     )
     before, after = plain.tips[count:], stray.tips[count:]
@@ -164,16 +164,16 @@ def test_locks_keep_a_parting() -> None:
             for k, x in enumerate(sides)
         ]
     )
-    hair = densify(guides, 400, locks=Locks(stray=0, scatter=0))
+    hair = densify(guides, 400, locks=LockOptions(stray=0, scatter=0))
     assert (np.sign(hair.tips[:, 0]) == np.sign((hair.tips - hair.roots)[:, 0])).all()
     assert np.abs((hair.tips - hair.roots)[:, 0]).min() > 0.06
 
 
-@pytest.mark.parametrize(("name", "value"), [("wisp", 0), ("gathered", "0.2,2"), ("stray", -1)])
+@pytest.mark.parametrize(("name", "value"), [("wisp", 0), ("to_lock", 2), ("stray", -1)])
 def test_options_of_locks_have_limits(name: str, value: object) -> None:
     """What is out of bounds is refused by name."""
     with pytest.raises(OptionError, match=name):
-        make_options(Locks, {name: value}, "locks")
+        make_options(LockOptions, {name: value}, "locks")
 
 
 def curtain() -> Strands:

