@@ -38,10 +38,10 @@ class LockOptions:
 
     lock: float = option(0.016, low=0.002, high=0.1, unit="m", doc="Spacing of locks at the scalp.")
     wisp: float = option(0.005, low=0.002, high=0.1, unit="m", doc="Spacing of wisps in a lock.")
-    to_lock: float = option(0.4, low=0, high=1, doc="Way of tips to their lock's middle, a share.")
-    to_wisp: float = option(0.6, low=0, high=1, doc="Way of tips to their wisp's middle, a share.")
+    to_lock: float = option(0.3, low=0, high=1, doc="Way of tips to their lock's middle, a share.")
+    to_wisp: float = option(0.5, low=0, high=1, doc="Way of tips to their wisp's middle, a share.")
     stray: float = option(0.05, low=0, high=1, doc="Share of hairs that keep out of locks.")
-    scatter: float = option(0.0016, low=0, high=0.05, unit="m", doc="RMS wander of a tip.")
+    scatter: float = option(0.002, low=0, high=0.05, unit="m", doc="RMS wander of a tip.")
     uneven: float = option(0.3, low=0, high=0.9, doc="Share of its length that a strand may lack.")
     curl: float = option(0.4, low=0, high=1, doc="Share by which waves differ from their guide's.")
 

@@ -26,7 +26,7 @@ from hairkit.rendering.head import Solid, bust_solid, head_solid
 from hairkit.rendering.light import EXPOSURE, Lights, hair_density, light_volume
 from hairkit.rendering.picture import display_width
 from hairkit.storage import write_bytes
-from hairkit.types.groom import Groom
+from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.head import Head, Roots
 from hairkit.types.strands import Strands
 
@@ -79,14 +79,7 @@ def packet_of(groom: Groom, roots: Roots | None = None) -> bytes:
     }
     facts = {
         "shading": shader_source("light_volume.glsl") + shader_source("hair_colour.glsl"),
-        "look": {
-            **LIGHTS.uniforms(),
-            **light.uniforms(),
-            "u_root_colour": groom.material.root_colour.tolist(),
-            "u_tip_colour": groom.material.tip_colour.tolist(),
-            "u_width": float(display_width(replace(hair, widths=None), groom.material)),
-            "u_taper": TAPER,
-        },
+        "look": LIGHTS.uniforms() | light.uniforms() | _look(hair, groom.material),
         "stiffness": groom.physics.stiffness,
         "strands": len(strands),
     }
@@ -116,6 +109,16 @@ def _mesh(name: str, solid: Solid) -> dict[str, npt.NDArray[Any]]:
         f"{name}_colours": solid.colours.astype(np.float32),
         f"{name}_uv": uv.astype(np.float32),
         f"{name}_faces": solid.faces.astype(np.uint32),
+    }
+
+
+def _look(hair: Strands, material: HairMaterial) -> dict[str, Any]:
+    """Return colours, width in metres and taper of the hair as uniforms of its shader."""
+    return {
+        "u_root_colour": material.root_colour.tolist(),
+        "u_tip_colour": material.tip_colour.tolist(),
+        "u_width": float(display_width(replace(hair, widths=None), material)),
+        "u_taper": TAPER,
     }
 
 

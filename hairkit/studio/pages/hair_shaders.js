@@ -1,5 +1,5 @@
-// Shaders of head, hair and wall. Hair is shaded as in pictures: its packet brings that shader, with
-// its constants, as the text that it is there.
+// Shaders of head, hair and wall. Hair is shaded as in pictures: its packet brings the text of that
+// shader, with its constants.
 
 // The vertex shader of the hair, which colours points with `seen_colour` of the text `shading`.
 export const hairVertex = (shading) => `#version 300 es
