@@ -8,7 +8,7 @@ out of phase average to nothing.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -89,7 +89,8 @@ def densify(
     if locks is None:
         new = course + bundle.waves[nearest]
     else:
-        new = _lay_in_locks(bundle, course, locks, generator)
+        curly = material.curl_radius > 0  # else the waves are bends, which must stay as they are
+        new = _lay_in_locks(bundle, course, locks if curly else replace(locks, curl=0), generator)
     return _join(even, new, nearest, uv, material)
 
 
@@ -256,7 +257,7 @@ def _wisps(bundle: _Bundle, locks: LockOptions) -> tuple[Float32Array, Float32Ar
     """Return courses (W, m, 3) and waves (W, m, 3) of wisps: the guides, then others between them.
 
     They depend on the guides alone, so that hair of any count and seed lies in the same locks.
-    Waves of others are those of the nearest guide turned about their course: locks out of phase.
+    Waves of others are those of the nearest guide, turned about their course: locks out of phase.
     """
     guides = bundle.course + bundle.roots[:, None]
     spacing = np.median(_neighbours(bundle, bundle.roots, 2)[0][:, -1])
@@ -267,8 +268,10 @@ def _wisps(bundle: _Bundle, locks: LockOptions) -> tuple[Float32Array, Float32Ar
     roots = _between_guides(bundle, more, generator)
     mix = _choose_guides(bundle, roots)
     course = _mix_courses(bundle, mix)
-    angles = generator.uniform(-np.pi, np.pi, more)
-    waves = turn_about(bundle.waves[mix.guides[:, 0]], np.gradient(course, axis=1), angles)
+    waves = bundle.waves[mix.guides[:, 0]]
+    if locks.curl > 0:
+        angles = generator.uniform(-np.pi, np.pi, more)
+        waves = turn_about(waves, np.gradient(course, axis=1), angles)
     return np.concatenate([guides, course + roots[:, None]]), np.concatenate([bundle.waves, waves])
 
 

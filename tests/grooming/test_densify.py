@@ -11,9 +11,13 @@ from hypothesis import strategies as st
 from scipy.spatial import cKDTree
 
 from hairkit.errors import InputError, OptionError
+from hairkit.evaluation.strand_statistics import deeper_than
 from hairkit.grooming.densify import densify
 from hairkit.grooming.locks import TAPER, LockOptions
+from hairkit.head_model.template import default_head
 from hairkit.options import make_options
+from hairkit.synth import grow
+from hairkit.synth.growth import StyleName
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import HairMaterial
 from hairkit.types.strands import Strands
@@ -167,6 +171,14 @@ def test_locks_keep_a_parting() -> None:
     hair = densify(guides, 400, locks=LockOptions(stray=0, scatter=0))
     assert (np.sign(hair.tips[:, 0]) == np.sign((hair.tips - hair.roots)[:, 0])).all()
     assert np.abs((hair.tips - hair.roots)[:, 0]).min() > 0.06
+
+
+@pytest.mark.parametrize("style", ["straight", "curly", "short"])
+def test_hair_stays_out_of_the_head(style: StyleName) -> None:
+    """Locks and stray hairs lead no more than one point in ten thousand under the skin."""
+    groom = grow(style, default_head(), 600)
+    hair = densify(groom, 3000)
+    assert deeper_than(groom.head, hair.points, 0.002).mean() < 1e-4
 
 
 @pytest.mark.parametrize(("name", "value"), [("wisp", 0), ("to_lock", 2), ("stray", -1)])

@@ -29,7 +29,8 @@ def test_hair_lies_at_rest_where_it_was_made() -> None:
     radius = np.linalg.norm(hair[:, 0], axis=1)
     assert (np.abs(radius - 0.1) < 0.004).all()  # the roots, on the ball of 10 cm
     length = np.linalg.norm(np.diff(hair, axis=1), axis=2).sum(axis=1)
-    assert (np.abs(length - 0.03) < 0.011).all()  # ends are uneven
+    assert abs(np.median(length) - 0.03) < 0.003
+    assert (np.abs(length - 0.03) < 0.016).all()  # ends are uneven, and some hairs stray
 
 
 def test_the_guides_come_first_and_follow_themselves() -> None:
