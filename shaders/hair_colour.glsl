@@ -1,5 +1,5 @@
-// Colour of a point of hair: light of two lamps and the sky, or its direction. Needs u_perspective and
-// u_forward.
+// Colour of a point of hair: light of two lamps and the sky, or its direction. Needs u_perspective,
+// u_forward and `light_at`. The studio's page includes it too.
 #include "lighting.glsl"
 #include "marschner.glsl"
 #include "tone.glsl"

@@ -1,14 +1,16 @@
 #version 430
 // Shapes ribbons and shades their points.
 #include "ribbon_shape.glsl"
+#include "light_volume.glsl"
 #include "hair_colour.glsl"
 
 void main() {
     uint index = gl_GlobalInvocationID.x;
     if (index >= u_count) return;
     vec3 tangent;
+    float cover;
     StrandPoint point = strand_points[index];
-    RibbonPoint r = shaped(index, point, tangent);
-    r.colour = packUnorm4x8(vec4(seen_colour(point.position.xyz, tangent, point.position.w, point.look.y), 1.0));
+    RibbonPoint r = shaped(index, point, tangent, cover);
+    r.colour = packUnorm4x8(vec4(seen_colour(point.position.xyz, tangent, point.position.w, point.look.y), cover));
     ribbon_points[index] = r;
 }

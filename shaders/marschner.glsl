@@ -18,7 +18,7 @@ vec3 fibre(vec3 tangent, vec3 to_light, vec3 to_eye, vec3 colour, float jitter) 
     float cos_half_phi = sqrt(0.5 + 0.5 * clamp(cos_phi, -1.0, 1.0));
 
     float r = R_SCALE * cos_half_phi * lobe(half_theta + 2.0 * TILT, ROUGHNESS);
-    float tt = exp(TT_FOCUS * (-cos_phi - 1.0)) * lobe(half_theta - TILT, ROUGHNESS);
+    float tt = exp(TT_FOCUS * (-cos_phi - 1.0)) * lobe(half_theta - TILT, 0.5 * ROUGHNESS);
     float trt = exp(TRT_FOCUS * (cos_phi - 1.0)) * lobe(half_theta - 3.0 * TILT, 2.0 * ROUGHNESS);
     float cos_in = sqrt(max(1.0 - sin_in * sin_in, 0.0));
     vec3 single = FRESNEL * r + TT_SHARE * colour * tt + TRT_SHARE * colour * sqrt(colour) * trt;

@@ -6,5 +6,6 @@ void main() {
     uint index = gl_GlobalInvocationID.x;
     if (index >= u_count) return;
     vec3 tangent;
-    ribbon_points[index] = shaped(index, strand_points[index], tangent);
+    float cover;
+    ribbon_points[index] = shaped(index, strand_points[index], tangent, cover);
 }

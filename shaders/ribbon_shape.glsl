@@ -22,7 +22,8 @@ uniform uint u_count;           // of strand points
 
 vec2 pixel_of(vec4 clip) { return (clip.xy / clip.w * 0.5 + 0.5) * u_size_px; }
 
-RibbonPoint shaped(uint index, StrandPoint point, out vec3 tangent) {
+// `cover` is the share of the ribbon that the strand covers: ribbons have a least width.
+RibbonPoint shaped(uint index, StrandPoint point, out vec3 tangent, out float cover) {
     vec3 before = strand_points[point.position.w > 0.0 ? index - 1u : index].position.xyz;
     vec3 after = strand_points[point.position.w < 1.0 ? index + 1u : index].position.xyz;
     tangent = normalize(after - before + vec3(0.0, 1e-12, 0.0));
@@ -34,6 +35,7 @@ RibbonPoint shaped(uint index, StrandPoint point, out vec3 tangent) {
                - pixel_of(u_clip_from_head * vec4(before, 1.0));
     along = dot(along, along) > 1e-12 ? normalize(along) : vec2(1.0, 0.0);
     float width_px = point.look.x * u_focal_px / mix(1.0, r.clip.w, u_perspective);
+    cover = min(width_px / u_min_width_px, 1.0);
     vec2 edge_px = vec2(-along.y, along.x) * 0.5 * max(width_px, u_min_width_px);
     r.across = edge_px * 2.0 / u_size_px * r.clip.w;
     r.colour = 0u;

@@ -1,4 +1,5 @@
 // Skin in two layers (Weyrich et al. 2006): oil that reflects, and flesh below that scatters.
+#include "light_volume.glsl"
 #include "lighting.glsl"
 #include "tone.glsl"
 #include "skin_lobe.glsl"

@@ -4,6 +4,7 @@
 // the hair before it. Software renderers run compute shaders on all cores, triangle set-up on one.
 #include "viewer_hair.glsl"
 #include "viewer_accumulation.glsl"
+#include "light_volume.glsl"
 #include "hair_colour.glsl"
 #constants hairkit.viewer.draw.shade_kernels HIDDEN ALL_HIDDEN DENSE
 #constants hairkit.viewer.draw.raster_kernels WIDEST

@@ -4,7 +4,7 @@ Everything that compares with true strands, masks, directions or cameras, and th
 here is used by a reconstruction.
 
 * `align`: the similarity that aligns a prediction with the truth; camera errors
-* `brightness`: luma of the drawn hair over the photos'
+* `likeness`: brightness, colour, contrast and coherence of the drawn hair over the photos'
 * `depth_map`: first visible surfaces of strands and head
 * `error_maps`: pictures of the report: right and wrong strands in each view
 * `evaluation`: all figures of one groom against one truth

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hairkit.arrays import BoolArray
+from hairkit.arrays import BoolArray, Float64Array
 from hairkit.evaluation.align import (
     Alignment,
     CameraError,
@@ -16,7 +16,6 @@ from hairkit.evaluation.align import (
     alignment_points,
     camera_errors,
 )
-from hairkit.evaluation.brightness import brightness_ratios
 from hairkit.evaluation.images import (
     DrawnDirections,
     OrientationError,
@@ -26,6 +25,7 @@ from hairkit.evaluation.images import (
     mask_iou,
     orientation_error,
 )
+from hairkit.evaluation.likeness import MEASURES, likeness
 from hairkit.evaluation.prediction import Prediction
 from hairkit.evaluation.scores import (
     Hits,
@@ -94,8 +94,8 @@ class Evaluation:
     """Of the 2D orientation maps; None when they were not given."""
     mask_views: tuple[float, ...] | None
     """Intersection over union of the hair masks; None when they were not given."""
-    brightness_views: tuple[float, ...] | None
-    """Luma of the drawn hair over that of the photo's, by view; None without photos or OpenGL."""
+    likeness_views: Float64Array | None
+    """(V, 6) `MEASURES` of drawn hair over those of photos; None without photos or OpenGL."""
     consistency: float | None
     """Share of a true strand that one predicted strand follows; None when not asked for."""
     evidence: Evidence
@@ -123,9 +123,11 @@ class Evaluation:
         return None if self.mask_views is None else float(np.mean(self.mask_views))
 
     @property
-    def brightness(self) -> float | None:
-        """Mean brightness of the drawn hair over the photos', None when unknown."""
-        return None if self.brightness_views is None else float(np.mean(self.brightness_views))
+    def likeness(self) -> dict[str, float] | None:
+        """Mean over the views of each measure of the drawn hair over the photo's, if known."""
+        if self.likeness_views is None:
+            return None
+        return dict(zip(MEASURES, self.likeness_views.mean(axis=0).tolist(), strict=True))
 
     def to_json(self) -> dict[str, Any]:
         """Return every figure as plain numbers, lists and dictionaries."""
@@ -134,7 +136,7 @@ class Evaluation:
             for field in dataclasses.fields(self)
             if field.name != "evidence"
         }
-        means = ("azimuth_error_deg", "silhouette", "orientation_deg", "mask_iou", "brightness")
+        means = ("azimuth_error_deg", "silhouette", "orientation_deg", "mask_iou", "likeness")
         return figures | {name: getattr(self, name) for name in means}
 
 
@@ -187,7 +189,7 @@ def evaluate(
         dense_strands=dense,
         orientation_views=_orientation(prediction, truth),
         mask_views=_masks(prediction, truth),
-        brightness_views=_brightness(prediction, truth, dense_strands),
+        likeness_views=_likeness(prediction, truth, dense_strands),
         consistency=strand_consistency(groom.strands, truth.strands) if consistency else None,
         evidence=Evidence(precision, recall, samples, directions, silhouettes),
     )
@@ -243,12 +245,12 @@ def _masks(prediction: Prediction, truth: Truth) -> tuple[float, ...] | None:
     )
 
 
-def _brightness(prediction: Prediction, truth: Truth, count: int) -> tuple[float, ...] | None:
+def _likeness(prediction: Prediction, truth: Truth, count: int) -> Float64Array | None:
     photos = truth.photos()
     if photos is None:
         return None
     hair = [truth.hair_mask(view) == HAIR for view in range(len(photos))]
-    return brightness_ratios(prediction.groom, prediction.cameras, photos, hair, count)
+    return likeness(prediction.groom, prediction.cameras, photos, hair, count)
 
 
 def _plain(value: Any) -> Any:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hairkit.evaluation.evaluation import Evaluation
+from hairkit.evaluation.likeness import MEASURES
 from hairkit.evaluation.scores import Score
 
 _F_MEANING = "higher is better, 100 is best: points of either side that have a match on the other"
@@ -77,13 +78,16 @@ def _view_figures(evaluation: Evaluation) -> tuple[Figure, ...]:
     apart = 1000 * float(np.mean([camera.position_m for camera in cameras]))
     lower, overlap = "lower is better", "higher is better, 1 is best"
     orientation, azimuth = evaluation.orientation_deg, evaluation.azimuth_error_deg
-    scale = 1 / evaluation.similarity.scale
+    scale, alike = 1 / evaluation.similarity.scale, evaluation.likeness or {}
     return (
         Figure("drawn direction within 20 deg", share, " %", 1, "higher is better, 100 is best"),
         Figure("silhouette IoU", evaluation.silhouette, "", 3, overlap),
         Figure("2D orientation error", orientation, " deg", 1, f"{lower}, guessing gives 45"),
         Figure("hair mask IoU", evaluation.mask_iou, "", 3, overlap),
-        Figure("brightness / photo", evaluation.brightness, "", 2, "1 is best: luma of the hair"),
+        *(
+            Figure(f"{name} / photo", alike.get(name), "", 2, "1 is best: of the drawn hair")
+            for name in MEASURES
+        ),
         Figure("metric scale / true", scale, "", 3, "1 is best: scores are of the groom so scaled"),
         Figure("camera azimuth error", azimuth, " deg", 2, lower),
         Figure("camera rotation error", rotation, " deg", 2, lower),

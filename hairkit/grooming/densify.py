@@ -1,13 +1,14 @@
 """Interpolate full hair from guides: each new strand blends the guides around its root.
 
-Shapes are blended relative to the root at equal arc-length fractions, only among guides that agree
-with the nearest one, so that partings stay clear. Detail finer than the guides' overall shape
-(waves, frizz) is copied from the nearest guide, because waves out of phase average to nothing.
+Courses are blended relative to the root at equal arc-length fractions, only among guides that agree
+with the nearest one, so that partings stay clear, and then lie in locks (`hairkit.grooming.locks`).
+Detail finer than the guides' overall shape (waves, frizz) is copied from one guide, because waves
+out of phase average to nothing.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -15,6 +16,7 @@ from scipy.spatial import cKDTree
 
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.errors import InputError
+from hairkit.grooming.locks import LockOptions, gather, strand_widths, turn_about, wander
 from hairkit.head_model.scalp import roots_at, sample_roots
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.head import Roots
@@ -38,10 +40,8 @@ BEYOND_FARTHEST = 1.05
 """Half the distance at which weights fall to 0, in distances of the farthest guide mixed."""
 MOST_STRETCH = 1.3
 """Factor by which a mixture, shorter than its guides, is lengthened at most."""
-SHORTENED = 0.12
-"""Share by which a new strand may be shorter than its mixture; the cube of a random number."""
-SWING = 0.4
-"""Slow swing of a new strand about its own line, in shares of the tip's wander."""
+MOST_WISPS = 6000
+"""Wisps that hair is gathered in at most."""
 MAX_POINTS = 128
 """Points a strand at most; longer guides are resampled."""
 
@@ -52,7 +52,7 @@ def densify(
     seed: int = 0,
     *,
     roots: Roots | npt.ArrayLike | None = None,
-    scatter: float = 0.0012,
+    locks: LockOptions | None = LockOptions(),  # noqa: B008 (frozen)
     material: HairMaterial | None = None,
 ) -> Strands:
     """Return `count` strands: the guides first, then hair interpolated between them.
@@ -68,8 +68,8 @@ def densify(
     roots
         Where the new strands start, count - S at least, as `Roots` or positions (N, 3). By
         default those of `roots_between`, or between neighbouring guides of bare strands.
-    scatter
-        Root mean square wander of a new strand's tip, metres; 0 mixes the guides exactly.
+    locks
+        How new hair lies in locks and strays from them; None mixes the guides exactly.
     material
         Gives the widths; the groom's by default.
     """
@@ -85,11 +85,13 @@ def densify(
     bundle = _Bundle.of(even)
     positions, uv = _new_roots(guides, bundle, count - len(strands), roots, seed, generator)
     mix = _choose_guides(bundle, positions)
-    shapes = _mix_shapes(bundle, mix)
-    if scatter > 0:
-        shapes += _wander(len(positions), bundle.points, scatter, generator)
-        shapes *= 1 - SHORTENED * generator.random((len(positions), 1, 1), dtype=np.float32) ** 3
-    return _join(even, positions[:, None] + shapes, mix.guides[:, 0], uv, material)
+    course, nearest = positions[:, None] + _mix_courses(bundle, mix), mix.guides[:, 0]
+    if locks is None:
+        new = course + bundle.waves[nearest]
+    else:
+        curly = material.curl_radius > 0  # else the waves are bends, which must stay as they are
+        new = _lay_in_locks(bundle, course, locks if curly else replace(locks, curl=0), generator)
+    return _join(even, new, nearest, uv, material)
 
 
 def roots_between(guides: Groom, count: int, seed: int = 0) -> Roots:
@@ -212,17 +214,16 @@ def _agreement(bundle: _Bundle, near: Int64Array) -> npt.NDArray[np.bool_]:
     return agrees
 
 
-def _mix_shapes(bundle: _Bundle, mix: _Mix) -> Float32Array:
-    """Return (N, m, 3) shapes relative to the root, as long as the guides they are mixed from."""
-    shape = np.zeros((len(mix.guides), bundle.points, 3), np.float32)
+def _mix_courses(bundle: _Bundle, mix: _Mix) -> Float32Array:
+    """Return (N, m, 3) courses relative to the root, as long as the guides they are mixed from."""
+    course = np.zeros((len(mix.guides), bundle.points, 3), np.float32)
     for k in range(mix.guides.shape[1]):
-        shape += mix.weights[:, k, None, None] * bundle.course[mix.guides[:, k]]
-    course_length = _shape_lengths(bundle.course)
-    wanted = (mix.weights * course_length[mix.guides]).sum(axis=1)
-    stretch = np.clip(wanted / np.maximum(_shape_lengths(shape), 1e-9), 1.0, MOST_STRETCH)
-    shape *= stretch[:, None, None].astype(np.float32)
-    shape += bundle.waves[mix.guides[:, 0]]
-    return shape
+        course += mix.weights[:, k, None, None] * bundle.course[mix.guides[:, k]]
+    lengths = _shape_lengths(bundle.course)
+    wanted = (mix.weights * lengths[mix.guides]).sum(axis=1)
+    stretch = np.clip(wanted / np.maximum(_shape_lengths(course), 1e-9), 1.0, MOST_STRETCH)
+    course *= stretch[:, None, None].astype(np.float32)
+    return course
 
 
 def _shape_lengths(shapes: Float32Array) -> Float64Array:
@@ -231,19 +232,47 @@ def _shape_lengths(shapes: Float32Array) -> Float64Array:
     return result
 
 
-def _wander(
-    count: int, points: int, scatter: float, generator: np.random.Generator
+def _lay_in_locks(
+    bundle: _Bundle, course: Float32Array, locks: LockOptions, generator: np.random.Generator
 ) -> Float32Array:
-    """Return (N, m, 3) slow random sideways offsets that are 0 at the root."""
-    t = np.linspace(0, 1, points, dtype=np.float32)
-    phase = 2 * np.pi * generator.random((count, 2), dtype=np.float32)
-    turns = 1 + 2 * generator.random((count, 2), dtype=np.float32)
-    drift = generator.standard_normal((count, 3), dtype=np.float32)
-    wave = generator.standard_normal((count, 3), dtype=np.float32)
-    swing = np.sin(phase[:, :1] + 2 * np.pi * turns[:, :1] * t) - np.sin(phase[:, :1])
-    offsets = t[None, :, None] * drift[:, None] + SWING * (t * swing)[:, :, None] * wave[:, None]
-    result: Float32Array = np.float32(scatter / np.sqrt(3)) * offsets
-    return result
+    """Return hair (N, m, 3) that follows its course (N, m, 3) in wisps, and these in locks."""
+    wisps, waves = _wisps(bundle, locks)
+    cells = np.floor(bundle.roots / locks.lock).astype(np.int64)
+    middles = wisps[np.unique(cells, axis=0, return_index=True)[1]]
+    wisps = gather(wisps, middles, locks.lock, np.full(len(wisps), locks.to_lock, np.float32))[0]
+    stray = generator.random(len(course)) < locks.stray
+    hold = (1 - generator.random(len(course), dtype=np.float32) ** 2) * ~stray
+    course = gather(course, middles, locks.lock, locks.to_lock * hold)[0]
+    course, which = gather(course, wisps, locks.wisp, locks.to_wisp * hold)
+    curl = 1 + locks.curl * generator.uniform(-1, 1, (len(course), 1, 1)).astype(np.float32)
+    course += waves[which] * curl
+    course += wander(course, locks, stray, generator)
+    count, points = course.shape[:2]
+    ends = 1 - locks.uneven * generator.random((count, 1)) ** 2
+    made = Strands(course.reshape(-1, 3), np.arange(count + 1) * points)
+    return made.resampled_at(ends * np.linspace(0, 1, points)).points.reshape(course.shape)
+
+
+def _wisps(bundle: _Bundle, locks: LockOptions) -> tuple[Float32Array, Float32Array]:
+    """Return courses (W, m, 3) and waves (W, m, 3) of wisps: the guides, then others between them.
+
+    They depend on the guides alone, so that hair of any count and seed lies in the same locks.
+    Waves of others are those of the nearest guide, turned about their course: locks out of phase.
+    """
+    guides = bundle.course + bundle.roots[:, None]
+    spacing = np.median(_neighbours(bundle, bundle.roots, 2)[0][:, -1])
+    more = int(min(len(guides) * ((spacing / locks.wisp) ** 2 - 1), MOST_WISPS - len(guides)))
+    if more <= 0:
+        return guides, bundle.waves
+    generator = np.random.default_rng(len(guides))
+    roots = _between_guides(bundle, more, generator)
+    mix = _choose_guides(bundle, roots)
+    course = _mix_courses(bundle, mix)
+    waves = bundle.waves[mix.guides[:, 0]]
+    if locks.curl > 0:
+        angles = generator.uniform(-np.pi, np.pi, more)
+        waves = turn_about(waves, np.gradient(course, axis=1), angles)
+    return np.concatenate([guides, course + roots[:, None]]), np.concatenate([bundle.waves, waves])
 
 
 def _join(
@@ -255,13 +284,12 @@ def _join(
 ) -> Strands:
     old, (count, m, _) = len(even), new.shape
     total = old + count
-    taper = 1 - 0.5 * np.linspace(0, 1, m) ** 3
     keep_uv = uv is not None and even.root_uv is not None
     group = None if even.group is None else np.concatenate([even.group, even.group[nearest]])
     return Strands(
         np.concatenate([even.points, new.reshape(-1, 3)]),
         np.arange(total + 1) * m,
-        np.tile(material.width * taper, total).astype(np.float32),
+        strand_widths(total, np.linspace(0, 1, m), material.width).ravel(),
         np.concatenate([even.root_uv, uv]) if keep_uv else None,
         group,
         np.arange(total) < old,

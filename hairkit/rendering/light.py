@@ -101,7 +101,7 @@ class LightVolume:
         return self.transmittance.transpose(2, 1, 0, 3).tobytes()
 
     def uniforms(self) -> dict[str, Any]:
-        """Return the values of `lighting.glsl` that place the volume."""
+        """Return the values of `light_volume.glsl` that place the volume."""
         size = np.array(self.grid.shape) * self.grid.spacing
         return {
             "u_volume_origin": tuple(self.grid.origin.tolist()),
@@ -109,12 +109,12 @@ class LightVolume:
         }
 
 
-def hair_density(strands: Strands, solids: Sequence[Surface]) -> Density:
-    """Return the extinction of hair and meshes on a grid around them."""
+def hair_density(strands: Strands, solids: Sequence[Surface], cell: float = CELL) -> Density:
+    """Return the extinction of hair and meshes on a grid around them, its cells `cell` metres."""
     points = [strands.points, *[solid.vertices for solid in solids]]
-    low = np.min([p.min(axis=0) for p in points if len(p)], axis=0) - 3 * CELL
-    high = np.max([p.max(axis=0) for p in points if len(p)], axis=0) + 3 * CELL
-    grid = VoxelGrid.around(low, high, max(CELL, float((high - low).max()) / MAX_EDGE))
+    low = np.min([p.min(axis=0) for p in points if len(p)], axis=0) - 3 * cell
+    high = np.max([p.max(axis=0) for p in points if len(p)], axis=0) + 3 * cell
+    grid = VoxelGrid.around(low, high, max(cell, float((high - low).max()) / MAX_EDGE))
     extinction = _hair_extinction(grid, strands)
     under = np.zeros(grid.shape, np.float32)
     for solid in solids:

@@ -29,7 +29,7 @@ BACKDROP_TOP, BACKDROP_BOTTOM = (176, 180, 184), (214, 216, 218)
 """sRGB of the neutral backdrop."""
 HEAD_PUSH = 0.0015
 """Meshes are drawn this far behind their surface, metres, so that they do not hide roots."""
-SHOWN_HAIRS = 50_000
+SHOWN_HAIRS = 60_000
 """Fewer strands are drawn wider, so that they cover the head as this many would."""
 WIDEST = 4.0
 """Largest factor of that widening."""
@@ -180,7 +180,7 @@ def _resize_camera(camera: Camera, width: int | None, height: int | None) -> Cam
 
 def display_width(strands: Strands, material: HairMaterial) -> float | Float32Array:
     """Return the width, or widths (P,), of strands in pictures, metres."""
-    wider = float(np.clip(np.sqrt(SHOWN_HAIRS / max(len(strands), 1)), 1.0, WIDEST))
+    wider = float(np.clip(SHOWN_HAIRS / max(len(strands), 1), 1.0, WIDEST))
     return wider * (material.width if strands.widths is None else strands.widths)
 
 

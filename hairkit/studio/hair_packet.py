@@ -8,33 +8,39 @@ from __future__ import annotations
 
 import json
 import struct
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial import cKDTree
 
 from hairkit.arrays import UInt8Array
 from hairkit.grooming.densify import densify
+from hairkit.grooming.guide_weights import closest_guides
+from hairkit.grooming.locks import TAPER
 from hairkit.imaging.picture_file import encode_picture
+from hairkit.rendering.context import shader_source
 from hairkit.rendering.head import Solid, bust_solid, head_solid
+from hairkit.rendering.light import EXPOSURE, Lights, hair_density, light_volume
+from hairkit.rendering.picture import display_width
 from hairkit.storage import write_bytes
-from hairkit.types.groom import Groom
+from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.head import Head, Roots
+from hairkit.types.strands import Strands
 
 MAGIC = b"HKS1"
 HAIRS, POINTS = 9000, 16
 """Strands drawn and points of each: what a phone draws sixty times a second."""
 MOST_GUIDES = 700
 """Guides that are simulated in the page."""
-CARRIERS = 3
-"""Guides that each hair follows."""
 SKIN_EDGE, SKIN_QUALITY = 1024, 85
 """Longest edge in pixels, and JPEG quality, of the picture of the skin: about 100 kB."""
-LEAST_DISTANCE = 1e-3
-"""Added to distances between roots, metres, before weights are taken as their inverse."""
+LIGHT_CELL = 0.006
+"""Edge of a cell of the light through the hair, metres: about 1 MB."""
+LIGHTS = Lights.studio((0.5, 0.6, 0.75), (-0.55, 0.6, -0.55), EXPOSURE)
+"""Key light in front on the subject's left, rim light behind: they stay when the view turns."""
 
 
 def write_packet(groom: Groom, path: Path, roots: Roots | None = None) -> None:
@@ -49,26 +55,31 @@ def packet_of(groom: Groom, roots: Roots | None = None) -> bytes:
     guides = strands.select(np.arange(len(strands)) % step == 0).resampled(POINTS)
     hair = densify(groom, HAIRS, roots=roots).resampled(POINTS)
     shape = (-1, POINTS, 3)
-    carried, weights = _carriers(guides.points.reshape(shape), hair.points.reshape(shape))
+    joined = Strands.from_list([*guides.points.reshape(shape), *hair.points.reshape(shape)])
+    marked = np.arange(len(joined)) < len(guides)
+    followed = closest_guides(replace(joined, guide=marked))
     head = groom.head
-    bust = bust_solid(head, strands)
+    own, bust = head_solid(head, groom.material), bust_solid(head, strands)
+    solids = [own, *([] if bust is None else [bust])]
+    light = light_volume(hair_density(hair, solids, LIGHT_CELL), LIGHTS)
     arrays: dict[str, npt.NDArray[Any]] = {
-        **_mesh("head", head_solid(head, groom.material)),
+        **_mesh("head", own),
         "head_scalp": head.scalp.astype(np.float32),
         "head_eyes": _on_eyes(head),
         **({} if bust is None else _mesh("bust", bust)),
         "guides": guides.points.astype(np.float32).reshape(shape),
         "hair": hair.points.astype(np.float32).reshape(shape),
-        "carriers": carried.astype(np.float32),
-        "weights": weights.astype(np.float32),
+        "carriers": followed.guides[len(guides) :].astype(np.float32),
+        "weights": followed.weights[len(guides) :],
         "capsules": np.hstack(
             [head.capsules.first, head.capsules.second, head.capsules.radius]
         ).astype(np.float32),
         **_skin(head),
+        "light": np.rint(255 * light.transmittance.transpose(2, 1, 0, 3)).astype(np.uint8),
     }
     facts = {
-        "root_colour": groom.material.root_colour.tolist(),
-        "tip_colour": groom.material.tip_colour.tolist(),
+        "shading": shader_source("light_volume.glsl") + shader_source("hair_colour.glsl"),
+        "look": LIGHTS.uniforms() | light.uniforms() | _look(hair, groom.material),
         "stiffness": groom.physics.stiffness,
         "strands": len(strands),
     }
@@ -101,6 +112,16 @@ def _mesh(name: str, solid: Solid) -> dict[str, npt.NDArray[Any]]:
     }
 
 
+def _look(hair: Strands, material: HairMaterial) -> dict[str, Any]:
+    """Return colours, width in metres and taper of the hair as uniforms of its shader."""
+    return {
+        "u_root_colour": material.root_colour.tolist(),
+        "u_tip_colour": material.tip_colour.tolist(),
+        "u_width": float(display_width(replace(hair, widths=None), material)),
+        "u_taper": TAPER,
+    }
+
+
 def _on_eyes(head: Head) -> npt.NDArray[np.float32]:
     """Return (V,) 1 on the eyeballs, 0 elsewhere."""
     found = np.zeros(len(head.vertices), np.float32)
@@ -118,15 +139,3 @@ def _skin(head: Head) -> dict[str, UInt8Array]:
     small = cv2.resize(pixels, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     data = encode_picture(np.asarray(small, np.uint8), ".jpg", SKIN_QUALITY)
     return {"head_skin": np.frombuffer(data, np.uint8)}
-
-
-def _carriers(
-    guides: npt.NDArray[np.float32], hair: npt.NDArray[np.float32]
-) -> tuple[npt.NDArray[Any], npt.NDArray[Any]]:
-    """Return the guides (N, 3) that each hair follows and their weights (N, 3), which sum to 1."""
-    near = min(CARRIERS, len(guides))
-    distance, index = cKDTree(guides[:, 0]).query(hair[:, 0], k=list(range(1, near + 1)))
-    weights = 1 / (distance + LEAST_DISTANCE)
-    weights /= weights.sum(axis=1, keepdims=True)
-    spare = CARRIERS - near
-    return np.pad(index, ((0, 0), (0, spare))), np.pad(weights, ((0, 0), (0, spare)))

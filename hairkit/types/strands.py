@@ -150,15 +150,21 @@ class Strands(Previewed, Stored):
             raise DataError(f"a strand needs at least 2 points, got {count}")
         return self._at(np.full(len(self), count))
 
+    def resampled_at(self, shares: Float64Array) -> Strands:
+        """Return strands with points at rising shares (m,) or (S, m), 0 to 1, of their length."""
+        count = shares.shape[-1]
+        own = np.broadcast_to(shares, (len(self), count))
+        return self._at(np.full(len(self), count), own.ravel())
+
     def resampled_by_length(self, step: float) -> Strands:
         """Return strands with points about `step` metres apart, equal in a strand; ends stay."""
         if not step > 0:
             raise DataError(f"resampling step is {step}, expected metres above 0")
         return self._at(np.maximum(np.ceil(self.lengths() / step - 1e-9).astype(np.int64), 1) + 1)
 
-    def _at(self, counts: Int64Array) -> Strands:
+    def _at(self, counts: Int64Array, shares: Float64Array | None = None) -> Strands:
         offsets = np.concatenate([[0], np.cumsum(counts)])
-        after, t = self._places(counts)
+        after, t = self.places(counts, shares)
         points = _mix(self.points, after, t[:, None])
         widths = None if self.widths is None else _mix(self.widths, after, t)
         return replace(self, points=points, offsets=offsets, widths=widths)
@@ -168,19 +174,25 @@ class Strands(Previewed, Stored):
 
         The points are the same matter in every frame, wherever it has moved.
         """
-        after, t = self._places(np.full(len(self), count))
+        after, t = self.places(np.full(len(self), count))
         return _mix(frames.swapaxes(0, 1), after, t[:, None, None]).swapaxes(0, 1)
 
-    def _places(self, counts: Int64Array) -> tuple[Int64Array, Float64Array]:
-        """Return the point after each new one, and how far on the new one lies between both."""
+    def places(
+        self, counts: Int64Array, shares: Float64Array | None = None
+    ) -> tuple[Int64Array, Float64Array]:
+        """Return the point after each new one, and how far on the new one lies between both.
+
+        There are `counts` (S,) of them, at `shares` of their strand's length; None: evenly spaced.
+        """
         offsets = np.concatenate([[0], np.cumsum(counts)])
         arc = self.arc_lengths()
         length = arc[self.offsets[1:] - 1]
-        rank = np.arange(offsets[-1]) - np.repeat(offsets[:-1], counts)
-        wanted = rank / np.repeat(counts - 1, counts) * np.repeat(length, counts)
-        base = np.concatenate([[0.0], np.cumsum(length + 1.0)])[
-            :-1
-        ]  # a strictly ascending key over all strands
+        if shares is None:
+            rank = np.arange(offsets[-1]) - np.repeat(offsets[:-1], counts)
+            shares = rank / np.repeat(counts - 1, counts)
+        wanted = shares * np.repeat(length, counts)
+        # a strictly ascending key over all strands
+        base = np.concatenate([[0.0], np.cumsum(length + 1.0)[:-1]])
         key = arc + np.repeat(base, self.counts)
         target = wanted + np.repeat(base, counts)
         after = np.clip(

@@ -19,7 +19,7 @@ from hairkit.pipeline.open_groom import groom_path, load_groom
 from hairkit.simulation.simulator import Measures, Surroundings
 from hairkit.types.camera import Camera
 from hairkit.types.groom import Groom
-from hairkit.viewer.draw.hair_data import HairBody, choose_shares, sample_guides, split_guides
+from hairkit.viewer.draw.hair_data import HairBody, choose_shares, split_guides
 from hairkit.viewer.head_adjustment import EDGE, Adjustment, Rerun
 from hairkit.viewer.head_motion import HeadMotion
 from hairkit.viewer.layers import Layers
@@ -300,7 +300,7 @@ class Session:
         self._guides, self._own = split_guides(opened.groom)
         self.opened = opened
         self._shares = choose_shares(self._guides.strands)
-        strands = sample_guides(self._guides.strands, self._shares)  # no more than is drawn
+        strands = self._guides.strands.resampled_at(self._shares)  # no more than is drawn
         drawn = replace(self._guides, strands=strands)
         self.simulation = TunableSimulator(self.manager, drawn, self._simulator)
         self.motion = HeadMotion(opened.groom.head.joints[1].astype(np.float64))

@@ -212,19 +212,9 @@ def _places(
     strands: Strands, picked: Int64Array, points: int
 ) -> tuple[Int64Array, Int64Array, Float64Array]:
     """Return, for K points of each picked strand, its rank, the point before and the share."""
-    arc = strands.arc_lengths()
-    length = arc[strands.offsets[1:] - 1]
-    # a key that ascends over all strands, so that one search serves them all
-    base = np.concatenate([[0.0], np.cumsum(length + 1.0)])[:-1]
-    key = arc + np.repeat(base, strands.counts)
-    row_of = np.repeat(np.arange(len(picked)), points)
-    share = np.tile(np.linspace(0, 1, points), len(picked))
-    strand = picked[row_of]
-    target = base[strand] + share * length[strand]
-    before = np.searchsorted(key, target, side="right") - 1
-    before = np.clip(before, strands.offsets[strand], strands.offsets[strand + 1] - 2)
-    span = np.maximum(key[before + 1] - key[before], 1e-12)
-    return row_of, before, np.clip((target - key[before]) / span, 0, 1)
+    after, share = strands.places(np.full(len(strands), points))
+    own = (picked[:, None] * points + np.arange(points)).ravel()
+    return np.repeat(np.arange(len(picked)), points), after[own] - 1, share[own]
 
 
 def _spread(

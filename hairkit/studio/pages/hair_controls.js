@@ -16,7 +16,7 @@ const HAIR_LABEL = "Hair on a head. Arrow keys turn it, plus and minus zoom, W i
 // Its view is kept in `seen` from one hair to the next; a `brush` draws on it.
 export function showHair(stage, buffer, { seen = {}, brush = null } = {}) {
   const controls = new HairControls(stage, readPacket(buffer), seen, brush);
-  stage.hairMotion = controls.motion; // for scripts that measure the motion
+  [stage.hairMotion, stage.hairView] = [controls.motion, controls.view]; // for scripts that measure
   return () => controls.close();
 }
 

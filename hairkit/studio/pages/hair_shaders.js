@@ -1,70 +1,48 @@
-// Shaders of head, hair and wall. Hair is shaded after Kajiya and Kay (1989).
+// Shaders of head, hair and wall. Hair is shaded as in pictures: its packet brings the text of that
+// shader, with its constants.
 
-export const HAIR_VERTEX = `#version 300 es
+// The vertex shader of the hair, which colours points with `seen_colour` of the text `shading`.
+export const hairVertex = (shading) => `#version 300 es
 precision highp float;
 precision highp sampler2D;
+precision highp sampler3D;
+const float u_perspective = 1.0;
+const vec3 u_forward = vec3(0.0);
+${shading}
 uniform sampler2D u_hair;      // (points * columns, rows) rest positions
 uniform sampler2D u_moved;     // (points, guides) displacement of every guide's points
 uniform mat4 u_clip_from_head;
-uniform vec3 u_eye;
 uniform vec2 u_layout;         // points of a strand, strands in a row of u_hair
-uniform float u_width, u_pixel;
+uniform float u_width, u_taper, u_pixel;
 in vec3 a_carriers, a_weights;
-out vec3 v_tangent, v_place;
-out float v_share, v_strand, v_side;
+out vec3 v_colour;
 
 vec3 place(int point) {
   int points = int(u_layout.x), columns = int(u_layout.y);
   ivec2 at = ivec2(gl_InstanceID % columns * points + point, gl_InstanceID / columns);
-  vec3 rest = texelFetch(u_hair, at, 0).xyz;
+  vec3 here = texelFetch(u_hair, at, 0).xyz;
   for (int k = 0; k < 3; ++k)
-    rest += a_weights[k] * texelFetch(u_moved, ivec2(point, int(a_carriers[k])), 0).xyz;
-  return rest;
+    here += a_weights[k] * texelFetch(u_moved, ivec2(point, int(a_carriers[k])), 0).xyz;
+  return here;
 }
 
 void main() {
   int points = int(u_layout.x), point = gl_VertexID / 2;
-  vec3 here = place(point);
   vec3 along = place(min(point + 1, points - 1)) - place(max(point - 1, 0));
-  v_tangent = normalize(along + vec3(0.0, 1e-9, 0.0));
-  v_share = float(point) / float(points - 1);
-  v_strand = fract(float(gl_InstanceID) * 0.61803399);
-  vec3 side = normalize(cross(v_tangent, u_eye - here));
+  vec3 here = place(point), tangent = normalize(along + vec3(0.0, 1e-9, 0.0));
+  float share = float(point) / float(points - 1);
+  v_colour = seen_colour(here, tangent, share, fract(float(gl_InstanceID) * 0.61803399));
+  vec3 side = normalize(cross(tangent, u_eye - here));
   float depth = (u_clip_from_head * vec4(here, 1.0)).w;
-  float width = max(u_width * (1.0 - 0.75 * v_share * v_share), u_pixel * depth);
-  v_side = gl_VertexID % 2 == 0 ? -1.0 : 1.0;
-  v_place = here;
-  gl_Position = u_clip_from_head * vec4(here + 0.5 * v_side * width * side, 1.0);
+  float width = max(u_width * (1.0 - u_taper * pow(share, 4.0)), u_pixel * depth);
+  gl_Position = u_clip_from_head * vec4(here + (float(gl_VertexID % 2) - 0.5) * width * side, 1.0);
 }`;
 
 export const HAIR_FRAGMENT = `#version 300 es
 precision highp float;
-uniform vec3 u_eye, u_key, u_root, u_tip, u_middle;
-in vec3 v_tangent, v_place;
-in float v_share, v_strand, v_side;
+in vec3 v_colour;
 out vec4 out_colour;
-
-float along(vec3 tangent, vec3 direction) {
-  float c = dot(tangent, direction);
-  return sqrt(max(1.0 - c * c, 0.0));
-}
-
-void main() {
-  vec3 t = normalize(v_tangent), eye = normalize(u_eye - v_place), key = normalize(u_key);
-  vec3 out_of_head = normalize(v_place - u_middle);
-  vec3 base = mix(u_root, u_tip, v_share) * (0.72 + 0.56 * v_strand);
-  float facing = 0.5 + 0.5 * dot(out_of_head, key);
-  float depth = mix(0.42, 1.0, smoothstep(0.0, 0.35, v_share));
-  vec3 half_way = normalize(eye + key);
-  float shift = 0.10 * (v_strand - 0.5);
-  float white = pow(along(normalize(t + (0.06 + shift) * out_of_head), half_way), 90.0);
-  float tinted = pow(along(normalize(t - (0.10 + shift) * out_of_head), half_way), 22.0);
-  float rim = pow(1.0 - abs(dot(out_of_head, eye)), 3.0);
-  vec3 colour = base * (0.42 + 1.1 * along(t, key) * facing) * depth;
-  colour += facing * depth * (0.035 * white + 0.8 * tinted * base) + rim * (0.35 * base + 0.02);
-  colour *= 1.0 - 0.25 * v_side * v_side;
-  out_colour = vec4(pow(colour / (1.0 + 0.35 * colour), vec3(1.0 / 2.2)), 1.0);
-}`;
+void main() { out_colour = vec4(v_colour, 1.0); }`;
 
 export const HEAD_VERTEX = `#version 300 es
 precision highp float;

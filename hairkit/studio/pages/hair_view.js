@@ -1,12 +1,12 @@
 // Head and hair drawn by WebGL 2. Hair: one instanced ribbon a strand, its points in a texture,
 // moved by the three guides that it follows.
 import {
-  HAIR_FRAGMENT, HAIR_VERTEX, HEAD_FRAGMENT, HEAD_VERTEX, WALL_FRAGMENT, WALL_VERTEX,
+  HAIR_FRAGMENT, HEAD_FRAGMENT, HEAD_VERTEX, WALL_FRAGMENT, WALL_VERTEX, hairVertex,
 } from "./hair_shaders.js";
 
 const COLUMNS = 128; // strands in a row of the texture: 16 points each make 2048 texels
 const SKIN = [172, 134, 115, 255]; // until the picture of the skin is decoded
-const SHOWN_WIDTH = 0.0007; // metres: few strands stand for a hundred thousand
+const LEAST_PX = 0.6; // width of a strand, of which samples of a pixel show part
 const NEAR = 0.05, FAR = 10, VIEW_ANGLE = 0.5; // metres, metres, radians
 
 export function readPacket(buffer) {
@@ -32,9 +32,10 @@ export class HairView {
     this.packet = packet;
     const { arrays } = packet;
     [this.hairs, this.points] = arrays.hair.shape;
-    this.hairProgram = program(gl, HAIR_VERTEX, HAIR_FRAGMENT);
+    this.hairProgram = program(gl, hairVertex(packet.facts.shading), HAIR_FRAGMENT);
     this.wallProgram = program(gl, WALL_VERTEX, WALL_FRAGMENT);
     this.headProgram = program(gl, HEAD_VERTEX, HEAD_FRAGMENT);
+    this.light = volume(gl, arrays.light);
     this.hair = texture(gl);
     this.moved = texture(gl);
     const width = this.points * COLUMNS, height = Math.ceil(this.hairs / COLUMNS);
@@ -116,9 +117,9 @@ export class HairView {
     const height = Math.round(canvas.clientHeight * sharp);
     if (canvas.width !== width) canvas.width = width;
     if (canvas.height !== height) canvas.height = height;
-    const { matrix, eye, right, up, back } = this.camera();
-    const key = right.map((value, k) => 0.55 * value + 0.75 * up[k] + 0.6 * back[k]);
-    const seen = { u_clip_from_head: matrix, u_eye: eye, u_key: key };
+    const { matrix, eye } = this.camera();
+    const { look } = this.packet.facts;
+    const seen = { u_clip_from_head: matrix, u_eye: eye };
     gl.viewport(0, 0, width, height);
     gl.clear(gl.DEPTH_BUFFER_BIT);
     gl.disable(gl.DEPTH_TEST);
@@ -126,9 +127,9 @@ export class HairView {
     gl.useProgram(this.wallProgram);
     gl.drawArrays(gl.TRIANGLES, 0, 3);
     gl.enable(gl.DEPTH_TEST);
-    this.drawSolids(seen);
+    this.drawSolids({ ...seen, u_key: look.u_key_direction });
     this.uploadMotion(motion);
-    this.drawHair(seen, height);
+    this.drawHair({ ...seen, ...look }, height);
   }
 
   drawSolids(seen) {
@@ -151,12 +152,12 @@ export class HairView {
   }
 
   drawHair(seen, height) {
-    const { gl, hairProgram, packet: { facts } } = this;
-    this.bind(hairProgram, ["u_hair", this.hair], ["u_moved", this.moved]);
+    const { gl, hairProgram } = this;
+    this.bind(hairProgram, ["u_hair", this.hair], ["u_moved", this.moved],
+      ["u_light", this.light, gl.TEXTURE_3D]);
     use(gl, hairProgram, {
-      ...seen, u_root: facts.root_colour, u_tip: facts.tip_colour, u_middle: this.middle,
-      u_layout: [this.points, COLUMNS], u_width: SHOWN_WIDTH,
-      u_pixel: (1.1 * 2 * Math.tan(VIEW_ANGLE / 2)) / Math.max(height, 1),
+      ...seen, u_layout: [this.points, COLUMNS],
+      u_pixel: (LEAST_PX * 2 * Math.tan(VIEW_ANGLE / 2)) / Math.max(height, 1),
     });
     gl.bindVertexArray(this.hairArray);
     gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 2 * this.points, this.hairs);
@@ -166,9 +167,9 @@ export class HairView {
   bind(made, ...samplers) {
     const { gl } = this;
     gl.useProgram(made);
-    samplers.forEach(([name, bound], unit) => {
+    samplers.forEach(([name, bound, kind], unit) => {
       gl.activeTexture(gl.TEXTURE0 + unit);
-      gl.bindTexture(gl.TEXTURE_2D, bound);
+      gl.bindTexture(kind ?? gl.TEXTURE_2D, bound);
       gl.uniform1i(gl.getUniformLocation(made, name), unit);
     });
   }
@@ -200,6 +201,19 @@ function texture(gl) {
   for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) {
     gl.texParameteri(gl.TEXTURE_2D, name, gl.NEAREST);
   }
+  return made;
+}
+
+// A texture of three bytes a cell, (z, y, x, 3), that is interpolated.
+function volume(gl, { shape: [deep, high, wide], data }) {
+  const made = gl.createTexture();
+  gl.bindTexture(gl.TEXTURE_3D, made);
+  gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
+  gl.texImage3D(
+    gl.TEXTURE_3D, 0, gl.RGB8, wide, high, deep, 0, gl.RGB, gl.UNSIGNED_BYTE, data);
+  gl.texParameteri(gl.TEXTURE_3D, gl.TEXTURE_MIN_FILTER, gl.LINEAR);
+  for (const axis of [gl.TEXTURE_WRAP_R, gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T])
+    gl.texParameteri(gl.TEXTURE_3D, axis, gl.CLAMP_TO_EDGE);
   return made;
 }
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array
 from hairkit.errors import InputError
 from hairkit.grooming.densify import densify, roots_between
 from hairkit.grooming.guide_weights import closest_guides, guide_mask
+from hairkit.grooming.locks import strand_widths
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
@@ -20,14 +21,12 @@ TOLERANCE = 8e-4
 """Allowed RMS distance between guides and drawn strands, metres."""
 COUNTS, POWERS = (8, 10, 12, 14, 16, 20, 24, 32, 48), (1.0, 1.5, 2.0)
 """Point counts tried, and exponents of their density towards the root, where hair bends most."""
-TAPER = 0.7
-"""Share of its width that a strand loses towards the tip, so that locks do not end bluntly."""
 TUFT = 8
 """Neighbouring strands that stay adjacent in the order of drawing."""
 BITS = 10
 """Of a place along an axis, in the order of neighbours."""
 FINE = 256
-"""Points of the dense resampling from which drawn points are interpolated."""
+"""Points at which strands are compared with the polylines that are drawn."""
 BLOCK = 20_000
 """Strands that are made at a time: they have more points until they are resampled."""
 MAX_HAIRS = 200_000
@@ -85,7 +84,7 @@ class HairBody:
         if not 0 <= hairs <= MAX_HAIRS:
             raise InputError(f"hairs is {hairs}, expected 0 to {MAX_HAIRS}")
         shares = choose_shares(guides) if shares is None else shares
-        rest = sample_guides(guides, shares).points.reshape(len(guides), -1, 3)
+        rest = _sampled(guides, shares)
         shape = _arrange_hair(groom, hairs, own, seed, shares)
         shape[: len(guides)] = rest  # a guide is where it is
         points, count = shape.reshape(-1, 3), len(shape)
@@ -93,25 +92,8 @@ class HairBody:
         mix = closest_guides(Strands(points, np.arange(count + 1) * len(shares), guide=marked))
         roots = np.einsum("sk,skc->sc", mix.weights, rest[:, 0][mix.guides])
         edges = np.diff(shape, axis=1, prepend=roots[:, None])
-        taper = (1 - TAPER * shares**4).astype(np.float32)
-        widths = np.tile(np.float32(groom.material.width) * taper, (count, 1))
+        widths = strand_widths(count, shares, groom.material.width)
         return cls(guides, shares, rest, mix.guides, mix.weights, edges, widths)
-
-
-def sample_guides(guides: Strands, shares: Float64Array) -> Strands:
-    """Return guides with the points that are drawn, at shares (m,) of their arc length."""
-    before, part = _places(guides, shares)
-    offsets = np.arange(len(guides) + 1) * len(shares)
-    points = _between(guides.points, before, part[..., None]).reshape(-1, 3)
-    widths = guides.widths
-    if widths is not None:
-        widths = _between(widths, before, part).ravel()
-    return replace(guides, points=points, offsets=offsets, widths=widths)
-
-
-def _between(values: Float32Array, before: Int64Array, part: Float32Array) -> Float32Array:
-    low = values[before]
-    return low + (values[before + 1] - low) * part
 
 
 def split_guides(groom: Groom, most: int = MAX_GUIDES) -> tuple[Groom, Strands | None]:
@@ -141,53 +123,24 @@ def split_guides(groom: Groom, most: int = MAX_GUIDES) -> tuple[Groom, Strands |
 def choose_shares(guides: Strands) -> Float64Array:
     """Return the fewest sample positions (m,) that keep the guides' shape within `TOLERANCE`."""
     some = guides.select(np.arange(0, len(guides), max(1, len(guides) // 100)))
-    fine = _resample_fine(some)
     for count in COUNTS:
         for power in POWERS:
             shares = np.linspace(0, 1, count) ** power
-            if _misfit(fine, shares) < TOLERANCE:
+            if _misfit(some, shares) < TOLERANCE:
                 return shares
     return np.linspace(0, 1, MOST_POINTS)
 
 
-def _misfit(fine: Float32Array, shares: Float64Array) -> float:
+def _misfit(strands: Strands, shares: Float64Array) -> float:
     """Return the RMS distance between strands and their polylines through `shares`."""
-    coarse = _sample_rows(fine, shares)
+    fine = strands.resampled(FINE).points.reshape(-1, FINE, 3)
+    coarse = _sampled(strands, shares)
     wanted = np.linspace(0, 1, FINE)
     after = np.clip(np.searchsorted(shares, wanted, side="right"), 1, len(shares) - 1)
     span = shares[after] - shares[after - 1]
     part = ((wanted - shares[after - 1]) / span)[:, None]
     chords = coarse[:, after - 1] * (1 - part) + coarse[:, after] * part
     return float(np.sqrt(((chords - fine) ** 2).sum(axis=2).mean()))
-
-
-def _resample_fine(strands: Strands) -> Float32Array:
-    """Return the strands resampled at FINE equal shares, (S, FINE, 3)."""
-    return Strands(strands.points, strands.offsets).resampled(FINE).points.reshape(-1, FINE, 3)
-
-
-def _sample_rows(fine: Float32Array, shares: Float64Array) -> Float32Array:
-    """Return points (S, m, 3) at shares of the length."""
-    place = shares * (FINE - 1)
-    low = np.minimum(place.astype(int), FINE - 2)
-    part = (place - low).astype(np.float32)[:, None]
-    rows: Float32Array = fine[:, low] * (1 - part) + fine[:, low + 1] * part
-    return rows
-
-
-def _places(guides: Strands, shares: Float64Array) -> tuple[Int64Array, Float32Array]:
-    """Return the point (G, m) before each sample, and the fraction (G, m) towards the next one."""
-    arc = guides.arc_lengths()
-    before = np.zeros((len(guides), len(shares)), np.int64)
-    part = np.zeros((len(guides), len(shares)), np.float32)
-    for index, low in enumerate(guides.offsets[:-1]):
-        own = arc[low : guides.offsets[index + 1]]
-        wanted = shares * own[-1]
-        at = np.clip(np.searchsorted(own, wanted, side="right"), 1, len(own) - 1) - 1
-        before[index] = low + at
-        span = np.maximum(own[at + 1] - own[at], 1e-12)
-        part[index] = np.clip((wanted - own[at]) / span, 0, 1)
-    return before, part
 
 
 def _arrange_hair(
@@ -215,17 +168,13 @@ def _interpolate(groom: Groom, count: int, seed: int, shares: Float64Array) -> F
         wanted = len(guides) + len(roots[some])
         block = densify(groom, wanted, seed + number, roots=roots[some])
         new = np.arange(len(guides), wanted)
-        made[some] = _sample_rows(_resample_fine(block.select(new)), shares)
+        made[some] = _sampled(block.select(new), shares)
     return made
 
 
 def _sampled(strands: Strands, shares: Float64Array) -> Float32Array:
     """Return points (S, m, 3) of strands at shares of their length."""
-    rows = np.empty((len(strands), len(shares), 3), np.float32)
-    index = np.arange(len(strands))
-    for some in _blocks(len(strands)):
-        rows[some] = _sample_rows(_resample_fine(strands.select(index[some])), shares)
-    return rows
+    return strands.resampled_at(shares).points.reshape(-1, len(shares), 3)
 
 
 def _blocks(count: int) -> Iterator[slice]:

@@ -49,7 +49,7 @@ class LightVolume(ABC):
         self.texture.release()
 
     def uniforms(self) -> dict[str, Any]:
-        """Return the values of `lighting.glsl` that place the volume, bound as texture 0."""
+        """Return the values of `light_volume.glsl` that place the volume, bound as texture 0."""
         size = np.array(self.grid.shape) * self.grid.spacing
         return {
             "u_light": 0,

@@ -16,7 +16,6 @@ from hairkit.viewer.draw.hair_data import (
     COUNTS,
     HairBody,
     choose_shares,
-    sample_guides,
     split_guides,
 )
 
@@ -30,7 +29,8 @@ def test_hair_lies_at_rest_where_it_was_made() -> None:
     radius = np.linalg.norm(hair[:, 0], axis=1)
     assert (np.abs(radius - 0.1) < 0.004).all()  # the roots, on the ball of 10 cm
     length = np.linalg.norm(np.diff(hair, axis=1), axis=2).sum(axis=1)
-    assert (np.abs(length - 0.03) < 0.008).all()
+    assert abs(np.median(length) - 0.03) < 0.003
+    assert (np.abs(length - 0.03) < 0.016).all()  # ends are uneven, and some hairs stray
 
 
 def test_the_guides_come_first_and_follow_themselves() -> None:
@@ -61,7 +61,7 @@ def test_sampled_guides_keep_roots_tips_and_widths() -> None:
     bristles = bristle_groom().strands
     strands = replace(bristles, widths=bristles.arc_lengths().astype(np.float32))
     shares = np.linspace(0, 1, 9) ** 1.5
-    sampled = sample_guides(strands, shares)
+    sampled = strands.resampled_at(shares)
     assert (sampled.counts == 9).all()
     np.testing.assert_allclose(sampled.roots, strands.roots, atol=1e-7)
     np.testing.assert_allclose(sampled.tips, strands.tips, atol=1e-7)
