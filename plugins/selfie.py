@@ -1,6 +1,6 @@
 """The person in a photo and the hair, by MediaPipe's two networks for selfies or the user's own.
 
-A network sees the photo in a square.
+A network sees the photo in a square and its mirror image; the mean of both is the answer.
 `selfie_segmentation` tells the person from the background, from all sides. `selfie_multiclass` also
 tells hair from skin and clothes, but may take a head from behind for background. The person is the
 mean of both; the second one's share of hair in a person holds for it.
@@ -72,10 +72,12 @@ def find_classes(image: UInt8Array, model: Path, nets: NetProcess) -> Float32Arr
     if len(shape) != 4 or shape[3] != 3:
         raise ModelError(f"{model}: wants {shape}, expected a network of colour pictures")
     small = cv2.resize(image, (shape[2], shape[1]), interpolation=cv2.INTER_AREA)
-    scores = nets.run(model, small[None] / np.float32(255))[0]
+    batch = np.stack([small, small[:, ::-1]]) / np.float32(255)
+    scores = nets.run(model, np.asarray(batch, np.float32))[0]
     if scores.ndim != 4:
         raise ModelError(f"{model}: gives {scores.shape}, expected one map or more of the photo")
-    return _probability(scores[0])
+    plain, mirrored = _probability(scores)
+    return (plain + mirrored[:, ::-1]) / 2
 
 
 def _levels(cells: Float32Array, size: tuple[int, int]) -> UInt8Array:
@@ -85,7 +87,7 @@ def _levels(cells: Float32Array, size: tuple[int, int]) -> UInt8Array:
 
 
 def _probability(scores: Float32Array) -> Float32Array:
-    """Return probabilities (h, w, C) for what a network gives: these, or logits."""
+    """Return probabilities (N, H, W, C) for what a network gives: these, or logits."""
     if scores.shape[-1] == 1:
         bounded = scores.min() >= 0 and scores.max() <= 1
         return scores if bounded else np.asarray(1 / (1 + np.exp(-scores)), np.float32)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -14,7 +13,7 @@ from hairkit_plugins.selfie import MODELS, Options, find_classes, segment_person
 import hairkit
 from hairkit.errors import ModelError
 from hairkit.nets.model_folder import find_model, missing_models
-from hairkit.nets.net_process import NetProcess
+from hairkit.nets.net_process import NetProcess, shared_nets
 from hairkit.types.capture import View
 
 MODEL = find_model("selfie_multiclass")
@@ -113,20 +112,19 @@ def test_without_a_network_there_is_no_answer(
 
 @needs_network
 def test_the_person_is_found_in_every_view_of_the_sample() -> None:
-    """From all sides, person and mask share 0.8 or more of their union."""
+    """From all sides, person and mask share 0.85 or more of their union."""
     for view in hairkit.sample_capture().views:
         found = segment_person(view=view, options=Options()).alpha >= 128
         mask = mask_files.segment(view=view)
         assert mask is not None
-        assert (found & mask.person).sum() > 0.8 * (found | mask.person).sum(), view.name
+        assert (found & mask.person).sum() > 0.85 * (found | mask.person).sum(), view.name
 
 
 @needs_network
 def test_the_mirror_image_has_the_mirrored_person() -> None:
-    """The answer for the mirror image is nearly the mirror image of the answer."""
-    view = hairkit.sample_capture().views[1]
-    mirrored = replace(view, image=np.ascontiguousarray(view.image[:, ::-1]))
-    one, other = (
-        segment_person(view=each, options=Options()).alpha >= 128 for each in (view, mirrored)
-    )
-    assert (one[:, ::-1] & other).sum() > 0.95 * (one[:, ::-1] | other).sum()
+    """The answer for the mirror image is the mirror image of the answer."""
+    assert MODEL is not None
+    image = hairkit.sample_capture().views[1].image
+    plain = find_classes(image, MODEL, shared_nets())
+    mirrored = find_classes(np.ascontiguousarray(image[:, ::-1]), MODEL, shared_nets())
+    assert np.abs(plain[:, ::-1] - mirrored).max() < 0.01
