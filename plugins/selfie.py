@@ -77,7 +77,7 @@ def find_classes(image: UInt8Array, model: Path, nets: NetProcess) -> Float32Arr
     if scores.ndim != 4:
         raise ModelError(f"{model}: gives {scores.shape}, expected one map or more of the photo")
     plain, mirrored = _probability(scores)
-    return (plain + mirrored[:, ::-1]) / 2
+    return np.asarray((plain + mirrored[:, ::-1]) / 2, np.float32)
 
 
 def _levels(cells: Float32Array, size: tuple[int, int]) -> UInt8Array:
