@@ -19,6 +19,7 @@ from spoiled import GROOMS, RUNS, Files, curled
 from hairkit.errors import HairkitError
 from hairkit.io.capture_reader import read_capture
 from hairkit.manager import Manager
+from hairkit.pipeline.drawn_hair import PhotoHair
 from hairkit.pipeline.figure import AMBER, GREEN, RED, Figure
 from hairkit.pipeline.find_views import frame_photos
 from hairkit.pipeline.health import assess_drawing
@@ -110,7 +111,8 @@ class Bench:
         capture, scene = capture.arranged(last.latest(TURN)), last.latest(last.scene)
         masks = last.masks(scene.names)
         assert masks is not None
-        drawn = assess_drawing(capture, masks, scene, groom)
+        shown = [PhotoHair.of(v.image, mask) for v, mask in zip(capture.views, masks, strict=True)]
+        drawn = assess_drawing(shown, scene, groom)
         old = read_record(out / RECORD).health
         return (*(f for f in old if f.name not in DRAWN), *drawn)
 

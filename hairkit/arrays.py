@@ -17,6 +17,7 @@ UInt8Array = npt.NDArray[np.uint8]
 BoolArray = npt.NDArray[np.bool_]
 
 _Array = TypeVar("_Array", bound=npt.NDArray[Any])
+_Number = TypeVar("_Number", bound=np.generic)
 
 MAX_REACH = 1000.0
 """Metres from the origin that lengths and points of files may reach.
@@ -73,6 +74,11 @@ def read_only(array: _Array) -> _Array:
     """Return an array that nobody writes again, so that `frozen_array` need not copy it."""
     array.setflags(write=False)
     return array
+
+
+def for_kernel(array: npt.NDArray[_Number]) -> npt.NDArray[_Number]:
+    """Return a read-only view of an array by rows: a kernel is compiled once for all of them."""
+    return read_only(np.ascontiguousarray(array)[...])
 
 
 def unit_vectors(vectors: npt.NDArray[np.floating[Any]]) -> npt.NDArray[Any]:

@@ -32,7 +32,7 @@ from hairkit import (
     Waves,
     hookimpl,
 )
-from hairkit.arrays import Float32Array, Float64Array, Int64Array
+from hairkit.arrays import Float32Array, Float64Array, Int64Array, for_kernel
 from hairkit.field.growth_prior import hair_way, long_share
 from hairkit.field.sampling_kernels import copy_point, gradient_at, make_unit, sample_at
 from hairkit.grooming.cover_hair import find_bare_cells, lead_to_roots
@@ -204,7 +204,7 @@ def grow(
         sign,
     )
     order = np.lexsort((field.grid.nearest_cell(starts) // BLOCK).T)
-    growth = (volume, rules, starts, limits, order, points)
+    growth = (volume, rules, for_kernel(starts), limits, order, points)
     parallel_for(_grow_strands, len(starts), *growth, min_chunk=MIN_STRANDS)
     return Strands(points.reshape(-1, 3), np.arange(len(starts) + 1) * options.points)
 

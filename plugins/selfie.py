@@ -54,16 +54,17 @@ def segment_person(view: View, options: Options) -> Person | None:
     answers = [find_classes(view.image, path, shared_nets()) for path in paths if path is not None]
     if not answers:
         return None
-    persons = [maps[0] if len(maps) == 1 else 1 - maps[0] for maps in answers]
-    person = np.asarray(np.mean(persons, axis=0), np.float32)
-    if len(answers[-1]) < 3:
-        return Person(_levels(person))
-    share = (answers[-1][1] + _DOUBT / 2) / (persons[-1] + _DOUBT)
-    return Person(_levels(person), _levels(person * share))
+    persons = [maps[..., 0] if maps.shape[-1] == 1 else 1 - maps[..., 0] for maps in answers]
+    cells, size = persons[-1].shape[::-1], (view.width, view.height)
+    person = np.asarray(np.mean([cv2.resize(one, cells) for one in persons], axis=0), np.float32)
+    if answers[-1].shape[-1] < 3:
+        return Person(_levels(person, size))
+    share = (answers[-1][..., 1] + _DOUBT / 2) / (persons[-1] + _DOUBT)
+    return Person(_levels(person, size), _levels(person * share, size))
 
 
 def find_classes(image: UInt8Array, model: Path, nets: NetProcess) -> Float32Array:
-    """Return the probability of each class of a network (C, H, W) in a photo (H, W, 3), RGB.
+    """Return the probability (h, w, C) of a network's classes in the cells of a photo (H, W, 3).
 
     Raises `ModelError` for a file that is no network, and for one of other inputs or outputs.
     """
@@ -76,16 +77,13 @@ def find_classes(image: UInt8Array, model: Path, nets: NetProcess) -> Float32Arr
     if scores.ndim != 4:
         raise ModelError(f"{model}: gives {scores.shape}, expected one map or more of the photo")
     plain, mirrored = _probability(scores)
-    height, width = image.shape[:2]
-    large = [
-        cv2.resize(one, (width, height), interpolation=cv2.INTER_CUBIC)
-        for one in np.moveaxis((plain + mirrored[:, ::-1]) / 2, -1, 0)
-    ]
-    return np.asarray(np.stack(large).clip(0, 1), np.float32)
+    return np.asarray((plain + mirrored[:, ::-1]) / 2, np.float32)
 
 
-def _levels(probability: Float32Array) -> UInt8Array:
-    return np.asarray((255 * probability).round(), np.uint8)
+def _levels(cells: Float32Array, size: tuple[int, int]) -> UInt8Array:
+    """Return the probability of all pixels (H, W), 0 to 255, from that of cells (h, w)."""
+    large = cv2.resize(255 * cells, size, interpolation=cv2.INTER_CUBIC)
+    return np.asarray(np.rint(large.clip(0, 255)), np.uint8)
 
 
 def _probability(scores: Float32Array) -> Float32Array:

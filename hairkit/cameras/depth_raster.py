@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.arrays import Float32Array, Float64Array, Int32Array, UInt8Array
+from hairkit.arrays import Float32Array, Float64Array, Int32Array, UInt8Array, for_kernel
 from hairkit.cameras.projection_kernels import (
     PackedCamera,
     Vector,
@@ -51,7 +51,7 @@ def mesh_depth(vertices: Float32Array, faces: Int32Array, camera: Camera) -> Flo
     nearness = np.full((camera.height, camera.width), -np.inf if orthographic else 0, np.float32)
     corners = np.empty((len(vertices), 3))
     _project_vertices(pack_camera(camera), vertices.astype(np.float64), corners)
-    _draw_faces(corners, faces, orthographic, nearness)
+    _draw_faces(corners, for_kernel(faces), orthographic, nearness)
     if orthographic:
         return -nearness
     with np.errstate(divide="ignore"):
@@ -66,7 +66,7 @@ def point_depth(
     A disc of `radius` metres covers the pixel that holds its middle and all whose centres it holds.
     """
     depth = _empty_depth(camera)
-    _draw_discs(pack_camera(camera), np.ascontiguousarray(points, np.float32), radius, depth)
+    _draw_discs(pack_camera(camera), for_kernel(np.asarray(points, np.float32)), radius, depth)
     return depth
 
 
@@ -79,7 +79,7 @@ def depth_behind(
     """
     behind = np.full(len(points), np.inf)
     parallel_for(
-        _compare_depth, len(points), pack_camera(camera), depth, points, behind,
+        _compare_depth, len(points), pack_camera(camera), depth, for_kernel(points), behind,
         min_chunk=MIN_POINTS,
     )  # fmt: skip
     return behind
@@ -99,7 +99,7 @@ def front_values(
     picture = np.zeros(depth.shape, np.uint8)
     if head is not None:
         depth = head_depth(head, camera) + np.float32(HEAD_TOLERANCE)
-    _draw_values(pack_camera(camera), points, values, depth, picture)
+    _draw_values(pack_camera(camera), for_kernel(points), for_kernel(values), depth, picture)
     return picture
 
 

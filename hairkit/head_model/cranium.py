@@ -82,13 +82,11 @@ class Cranium:
 
 def _far_from_hair(mask: Mask, size: tuple[int, int]) -> Float32Array:
     """Return 1 where no hair is near, in a smaller picture."""
-    reach = max(1, round(HAIR_GAP * mask.labels.shape[0]))
-    other = (mask.labels != HAIR).astype(np.uint8)
-    away = cv2.distanceTransform(other, cv2.DIST_L2, cv2.DIST_MASK_5)
-    far = (away > reach).astype(np.float32)
-    result = np.zeros(size[::-1], np.float32)
     share = min(1.0, size[1] / mask.labels.shape[0])
-    small = cv2.resize(far, None, fx=share, fy=share, interpolation=cv2.INTER_AREA)
+    other = np.where(mask.labels == HAIR, np.uint8(0), np.uint8(255))
+    small = cv2.resize(other, None, fx=share, fy=share, interpolation=cv2.INTER_AREA)
+    away = cv2.distanceTransform((small == 255).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
+    result = np.zeros(size[::-1], np.float32)
     rows, columns = min(small.shape[0], size[1]), min(small.shape[1], size[0])
-    result[:rows, :columns] = small[:rows, :columns] > 1 - LEAST_SHARE
+    result[:rows, :columns] = away[:rows, :columns] > max(HAIR_GAP * len(small), 1)
     return result

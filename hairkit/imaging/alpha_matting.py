@@ -7,18 +7,21 @@ Duff 1984).
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
+import numpy.typing as npt
 
-from hairkit.arrays import BoolArray, Float32Array, UInt8Array
+from hairkit.arrays import BoolArray, Float32Array, Int64Array, UInt8Array
 from hairkit.imaging.masked_filters import blur, picture_scale
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON
 
 _SIGMAS = (4.0, 12.0, 36.0)
 """Gaussians in reduced pixels of the local means; wider ones count where narrower have nothing."""
 
-_CELL_OF_SIGMA = 4
-"""Wide Gaussians are computed on cells of a quarter of their sigma."""
+_CELL_OF_SIGMA = 2
+"""Gaussians are computed on cells of half their sigma."""
 
 _FADE = 0.02
 """Weight of a Gaussian against the next narrower one."""
@@ -52,36 +55,21 @@ def refine_labels(
 ) -> UInt8Array:
     """Return labels (H, W) of the full picture from those of a reduced one.
 
-    Parameters are those of `refine_labels_and_alpha`.
+    Parameters are those of `refine_near_hair`, and where hair can be (h, w).
     """
-    return refine_labels_and_alpha(image, labels, seeds, hair_allowed)[0]
+    fine, _ = _refine(image, labels, seeds, np.ones(labels.shape, np.bool_))
+    allowed = _enlarge(hair_allowed.astype(np.uint8), *image.shape[1::-1]) > 0
+    fine[(fine == HAIR) & ~allowed] = BACKGROUND
+    return fine
 
 
 def refine_near_hair(
     image: UInt8Array, labels: UInt8Array, seeds: UInt8Array
 ) -> tuple[UInt8Array, UInt8Array]:
-    """Return labels (H, W) and opacity with edges refined near the hair of the reduced picture.
+    """Return labels (H, W) of the full picture, refined near hair, and the hair's opacity.
 
-    Far from hair an outline between skin and backdrop that is as dark as hair is none. Parameters
-    are those of `refine_labels_and_alpha`.
-    """
-    anywhere = np.ones(labels.shape, np.bool_)
-    fine, alpha = refine_labels_and_alpha(image, labels, seeds, anywhere)
-    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_NEARBY, _NEARBY))
-    nearby = cv2.dilate((labels == HAIR).astype(np.uint8), disc)
-    large = image.shape[1::-1]
-    far = cv2.resize(nearby, large, interpolation=cv2.INTER_NEAREST) == 0
-    coarse = cv2.resize(labels, large, interpolation=cv2.INTER_NEAREST)
-    result: UInt8Array = np.where(far, coarse, fine).astype(np.uint8)
-    return result, np.where(far, np.uint8(0), alpha)
-
-
-def refine_labels_and_alpha(
-    image: UInt8Array, labels: UInt8Array, seeds: UInt8Array, hair_allowed: BoolArray
-) -> tuple[UInt8Array, UInt8Array]:
-    """Return labels (H, W) of the full picture from those of a reduced one, and hair's opacity.
-
-    The opacity (H, W), 0 to 255, is the share of hair in a pixel near an edge.
+    The opacity (H, W), 0 to 255, is the share of hair in a pixel near an edge. Far from hair an
+    outline between skin and backdrop that is as dark as hair is none.
 
     Parameters
     ----------
@@ -91,38 +79,44 @@ def refine_labels_and_alpha(
         255, 128 and 0, correct but for a few pixels at the edges.
     seeds : (h, w)
         Labels that are certain; other values elsewhere.
-    hair_allowed : (h, w)
-        False where no hair can be.
     """
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (_NEARBY, _NEARBY))
+    return _refine(image, labels, seeds, cv2.dilate((labels == HAIR).astype(np.uint8), disc) > 0)
+
+
+def _refine(
+    image: UInt8Array, labels: UInt8Array, seeds: UInt8Array, near: BoolArray
+) -> tuple[UInt8Array, UInt8Array]:
+    """Return labels and opacity (H, W), refined where `near` (h, w) says so."""
     height, width = image.shape[:2]
-    lab = cv2.cvtColor(image.astype(np.float32) / np.float32(255), cv2.COLOR_RGB2Lab)
-    lab = blur(np.asarray(lab, np.float32), max(picture_scale(height), _LEAST_BLUR))
-    small = np.asarray(
-        cv2.resize(lab, labels.shape[::-1], interpolation=cv2.INTER_AREA), np.float32
-    )
     sure = _sure(labels, seeds)
-    if not sure[HAIR].any():
-        plain = cv2.resize(labels, (width, height), interpolation=cv2.INTER_NEAREST)
-        enlarged: UInt8Array = np.asarray(plain, np.uint8)
-        return enlarged, np.where(enlarged == HAIR, np.uint8(255), np.uint8(0))
-    unsure = ~np.logical_or.reduce(list(sure.values()))
-    band = _enlarge(unsure, width, height)
-    mean = {
-        label: _upsample(_local_mean(small, core), band)
+    result = _enlarge(labels, width, height)
+    alpha = np.where(result == HAIR, np.uint8(255), np.uint8(0))
+    unsure = near & ~np.logical_or.reduce(list(sure.values()))
+    band = np.flatnonzero(_enlarge(unsure.astype(np.uint8), width, height))
+    if not sure[HAIR].any() or not band.size:
+        return result, alpha
+    smooth = cv2.GaussianBlur(image, (0, 0), max(picture_scale(height), _LEAST_BLUR))
+    small = _lab(cv2.resize(smooth, labels.shape[::-1], interpolation=cv2.INTER_AREA))
+    around = {
+        label: _take(cv2.resize(_surroundings(small, core), (width, height)), band)
         for label, core in sure.items()
         if core.any()
     }
-    away = {label: _upsample(_distance(sure[label]), band) for label in mean}
-    coarse = np.where(unsure, np.uint8(PERSON), labels)
-    large = cv2.resize(coarse, (width, height), interpolation=cv2.INTER_NEAREST)
-    result: UInt8Array = np.asarray(large, np.uint8)
-    result[band], share = _classify(lab[band], mean, away)
-    alpha = np.where(result == HAIR, np.uint8(255), np.uint8(0))
-    alpha[band] = np.rint(255 * share)
-    forbidden = (result == HAIR) & ~_enlarge(hair_allowed, width, height)
-    result[forbidden] = BACKGROUND
-    alpha[forbidden] = 0
+    result.flat[band], share = _classify(_lab(_take(smooth, band)[None])[0], around)
+    alpha.flat[band] = np.rint(255 * share)
     return result, alpha
+
+
+def _take(picture: npt.NDArray[Any], pixels: Int64Array) -> npt.NDArray[Any]:
+    """Return some pixels (N, C) of a picture (H, W, C), by their numbers (N,)."""
+    return picture.reshape(-1, picture.shape[2]).take(pixels, axis=0)
+
+
+def _lab(picture: npt.NDArray[Any]) -> Float32Array:
+    return np.asarray(
+        cv2.cvtColor(picture.astype(np.float32) / np.float32(255), cv2.COLOR_RGB2Lab), np.float32
+    )
 
 
 def _sure(labels: UInt8Array, seeds: UInt8Array) -> dict[int, BoolArray]:
@@ -139,25 +133,26 @@ def _sure(labels: UInt8Array, seeds: UInt8Array) -> dict[int, BoolArray]:
 
 
 def _classify(
-    colour: Float32Array, mean: dict[int, Float32Array], away: dict[int, Float32Array]
+    colour: Float32Array, around: dict[int, Float32Array]
 ) -> tuple[UInt8Array, Float32Array]:
     """Return label (N,) and share of hair (N,) of pixels of `colour` (N, 3).
 
-    A pixel is mixed of hair and of the likelier of the other two.
+    A pixel is mixed of hair and of the likelier of the other two, by the `_surroundings` (N, 4).
     """
     best = np.full(len(colour), np.inf, np.float32)
     result = np.full(len(colour), HAIR, np.uint8)
     opacity = np.ones(len(colour), np.float32)
     limits = {PERSON: HAIR_OVER_PERSON, BACKGROUND: HAIR_OVER_BACKGROUND}
     for label, limit in limits.items():
-        if label not in mean:
+        if label not in around:
             continue
-        across = mean[HAIR] - mean[label]
-        offset = colour - mean[label]
+        mean, away = around[label][:, :3], around[label][:, 3]
+        across = around[HAIR][:, :3] - mean
+        offset = colour - mean
         norm = np.maximum(np.einsum("nc,nc->n", across, across), 1.0)
         share = np.clip(np.einsum("nc,nc->n", offset, across) / norm, 0, 1)
         rest = offset - share[:, None] * across
-        misfit = np.einsum("nc,nc->n", rest, rest) / _NOISE + _PER_PIXEL * away[label]
+        misfit = np.einsum("nc,nc->n", rest, rest) / _NOISE + _PER_PIXEL * away
         better = misfit < best
         best = np.where(better, misfit, best)
         result = np.where(better, np.where(share > limit, HAIR, label), result).astype(np.uint8)
@@ -165,36 +160,28 @@ def _classify(
     return result, opacity
 
 
-def _local_mean(values: Float32Array, core: BoolArray) -> Float32Array:
-    """Return (h, w, 3) the mean over the nearby core; wider windows count where none is near."""
+def _surroundings(values: Float32Array, core: BoolArray) -> Float32Array:
+    """Return (h, w, 4) the mean over the nearby core, and the distance from it in pixels.
+
+    Wider windows count where none is near.
+    """
     height, width = core.shape
     weight = core.astype(np.float32)
-    total = np.zeros(values.shape, np.float32)
-    share = np.zeros_like(weight)
-    stack = np.dstack([values * weight[..., None], weight])
+    total = np.zeros((height, width, 4), np.float32)
+    stack = cv2.merge([*cv2.split(values * weight[..., None]), weight])
     for index, sigma in enumerate(_SIGMAS):
         step = int(sigma // _CELL_OF_SIGMA)
         size = (max(width // step, 1), max(height // step, 1))
         coarse = cv2.resize(stack, size, interpolation=cv2.INTER_AREA)
-        blurred = cv2.resize(blur(np.asarray(coarse, np.float32), sigma / step), (width, height))
-        total += _FADE**index * blurred[..., :3]
-        share += _FADE**index * blurred[..., 3]
-    lost = share < _NO_WEIGHT
-    mean = np.asarray(total / np.maximum(share, _NO_WEIGHT)[..., None], np.float32)
-    mean[lost] = values[core].mean(axis=0)
-    return mean
+        blurred = blur(np.asarray(coarse, np.float32), sigma / step)
+        total += _FADE**index * cv2.resize(blurred, (width, height))
+    lost = total[..., 3] < _NO_WEIGHT
+    total[..., :3] /= np.maximum(total[..., 3:], _NO_WEIGHT)
+    total[lost, :3] = values[core].mean(axis=0)
+    total[..., 3] = cv2.distanceTransform((~core).astype(np.uint8), cv2.DIST_L2, 3)
+    return total
 
 
-def _distance(core: BoolArray) -> Float32Array:
-    return np.asarray(cv2.distanceTransform((~core).astype(np.uint8), cv2.DIST_L2, 3), np.float32)
-
-
-def _enlarge(mask: BoolArray, width: int, height: int) -> BoolArray:
-    large = cv2.resize(mask.astype(np.uint8), (width, height), interpolation=cv2.INTER_NEAREST)
-    return np.asarray(large > 0)
-
-
-def _upsample(values: Float32Array, band: BoolArray) -> Float32Array:
-    """Return `values` of the reduced picture at the band's pixels of the full one."""
-    height, width = band.shape
-    return np.asarray(cv2.resize(values, (width, height))[band], np.float32)
+def _enlarge(picture: UInt8Array, width: int, height: int) -> UInt8Array:
+    large = cv2.resize(picture, (width, height), interpolation=cv2.INTER_NEAREST)
+    return np.asarray(large, np.uint8)

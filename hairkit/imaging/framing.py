@@ -106,28 +106,38 @@ def find_regions(capture: Capture, faces: tuple[Face, ...], persons: tuple[Perso
 
 def _region(view: View) -> Float64Array:
     """Return the corners (2, 2) of the part of a picture that holds the person; all where large."""
-    inner = _if_small(_without_border(view.image), view)
-    inside = None if view.person is None else _person_or_hair(view) > PERSON_LEVEL
-    if inside is None or inside.mean() < LEAST_PERSON:
+    inner = _without_border(view.image)
+    inner = inner if _is_small(inner, view) else _whole(view)
+    if view.person is None:
         return inner
+    part = _around(view.person.alpha)
+    if _is_small(part, view):  # a large person is no smaller with hair
+        part = _around(_person_or_hair(view))
+    within = part.clip(*inner)
+    return within if _is_small(part, view) and (within[1] > within[0]).all() else inner
+
+
+def _around(alpha: UInt8Array) -> Float64Array:
+    """Return the corners (2, 2) of a person with room around, no area where there is a speck."""
+    inside = alpha > PERSON_LEVEL
+    if inside.mean() < LEAST_PERSON:
+        return np.zeros((2, 2))
     spans = [np.nonzero(inside.any(axis))[0][[0, -1]] for axis in (0, 1)]
     first, last = np.transpose(spans).astype(np.float64)
     room = ROOM * (last - first).max()
-    part = _if_small(np.stack([first - room, last + room]), view).clip(*inner)
-    return part if (part[1] > part[0]).all() else inner
+    return np.stack([first - room, last + room])
 
 
-def _if_small(part: Float64Array, view: View) -> Float64Array:
-    """Return corners (2, 2), those of the whole picture where the part is most of it."""
-    large = (part[1] - part[0]).max() > REGION * max(view.width, view.height)
-    return _whole(view) if large else part
+def _is_small(part: Float64Array, view: View) -> bool:
+    """Return whether a part, by its corners (2, 2), is not most of the picture."""
+    return bool((part[1] - part[0]).max() <= REGION * max(view.width, view.height))
 
 
 def _without_border(image: UInt8Array) -> Float64Array:
     """Return the corners (2, 2) of a picture inside a border of one colour; all without such."""
     whole = np.array([[0.0, 0.0], image.shape[1::-1]])
-    apart = cv2.absdiff(image, np.full_like(image, image[0, 0]))
-    drawn: BoolArray = np.asarray((np.asarray(apart) > BORDER_LEVELS).any(axis=-1))
+    corner = image[0, 0].astype(np.float64)
+    drawn = np.asarray(cv2.inRange(image, corner - BORDER_LEVELS, corner + BORDER_LEVELS) == 0)
     if not drawn.any():
         return whole
     (left, right), (top, bottom) = (np.nonzero(drawn.any(axis))[0][[0, -1]] for axis in (0, 1))

@@ -19,6 +19,7 @@ import numpy as np
 from hairkit.arrays import Float32Array, UInt8Array
 from hairkit.imaging.masked_filters import blur
 from hairkit.imaging.seeded_segmentation import (
+    THINNED,
     LabelSettings,
     Mixture,
     appearance,
@@ -62,26 +63,26 @@ class HairPrior:
 def label_colours(photos: Sequence[HairPrior], settings: LabelSettings) -> list[UInt8Array]:
     """Return the labels (h, w) of photos of one person, before edges are refined."""
     features = [_features(photo) for photo in photos]
-    stacked = np.concatenate(features)
+    stacked = np.concatenate([rows.reshape(-1, rows.shape[2]) for rows in features])
     mean, deviation = stacked.mean(axis=0), stacked.std(axis=0) + np.float32(_LEAST_DEVIATION)
     features = [(rows - mean) / deviation for rows in features]
     resized = [_resized(photo) for photo in photos]
-    posteriors = taught = [
-        _of_classes(p, photo.face, 0.0) for p, photo in zip(resized, photos, strict=True)
+    taught = [
+        _of_classes(p, photo.face, 0.0)[THINNED] for p, photo in zip(resized, photos, strict=True)
     ]
     priors = [
         _of_classes(p, photo.bare, _FACIAL_HAIR) for p, photo in zip(resized, photos, strict=True)
     ]
-    for _ in range(settings.rounds):
-        teachers = [
-            np.dstack([late[..., :_FACE], first[..., _FACE]])
-            for late, first in zip(posteriors, taught, strict=True)
+    few = [rows[THINNED] for rows in features]
+    mixtures = _learn(few, taught, settings)
+    for _ in range(settings.rounds - 1):
+        late = [_weigh(r, p[THINNED], mixtures, settings) for r, p in zip(few, priors, strict=True)]
+        taught = [
+            np.dstack([posterior[..., :_FACE], first[..., _FACE]])
+            for posterior, first in zip(late, taught, strict=True)
         ]
-        mixtures = _learn(features, teachers, settings)
-        posteriors = [
-            _weigh(rows, prior, mixtures, settings)
-            for rows, prior in zip(features, priors, strict=True)
-        ]
+        mixtures = _learn(few, taught, settings)
+    posteriors = [_weigh(r, p, mixtures, settings) for r, p in zip(features, priors, strict=True)]
     found = []
     for posterior in posteriors:
         hair, person, background, face = np.moveaxis(posterior, -1, 0)
@@ -90,9 +91,9 @@ def label_colours(photos: Sequence[HairPrior], settings: LabelSettings) -> list[
 
 
 def _features(photo: HairPrior) -> Float32Array:
-    """Return (h w, 8) colour and texture of the reduced picture's pixels."""
+    """Return (h, w, 8) colour and texture of the reduced picture's pixels."""
     height, width = photo.bare.shape
-    return appearance(photo.image, width, height)[1].reshape(height * width, -1)
+    return appearance(photo.image, width, height)[1]
 
 
 def _resized(photo: HairPrior) -> Float32Array:
@@ -120,10 +121,7 @@ def _learn(
     most = _SAMPLES * min(len(features), _MOST_PHOTOS)
     mixtures = {}
     for index in range(len(_LABELS)):
-        sure = [
-            rows[(p[..., index] > _SURE).ravel()]
-            for rows, p in zip(features, teachers, strict=True)
-        ]
+        sure = [rows[p[..., index] > _SURE] for rows, p in zip(features, teachers, strict=True)]
         samples = np.concatenate(sure)
         if len(samples) >= _FEWEST:
             pick = np.random.default_rng(settings.seed).permutation(len(samples))[:most]
@@ -143,7 +141,7 @@ def _weigh(
     terms = polynomial_terms(features)
     evidence = np.full(prior.shape, -np.inf, np.float32)
     for index, mixture in mixtures.items():
-        evidence[..., index] = mixture.scores(terms).reshape(prior.shape[:2])
+        evidence[..., index] = mixture.scores(terms)
     relative = evidence - fold_last(np.maximum, evidence)[..., None]
     relative = np.maximum(relative, np.float32(-settings.evidence_cap))
     odds = prior * np.exp(blur(relative, _SMOOTH_SIGMA))

@@ -61,6 +61,9 @@ _CERTAIN, _CERTAIN_WINDOW = 0.95, 5
 """Least probability of pixels from which the mixtures are learnt again, and the edge in pixels of
 the square that has to have one label around them."""
 
+THINNED = np.s_[::2, ::2]
+"""Pixels of the reduced picture by which mixtures beside a prior are learnt again."""
+
 _ORDER = (HAIR, PERSON, BACKGROUND)
 """Classes of the channels of a probability."""
 _SURE, _FEWEST, _LEAST_PROBABILITY = 0.85, 30, 1e-4
@@ -100,8 +103,9 @@ class Mixture(NamedTuple):
     """(J,)"""
 
     def scores(self, terms: Float32Array) -> Float32Array:
-        """Return (N,) the log-likelihood of samples, from their terms (M, N)."""
-        return np.asarray((self.weights @ terms + self.offsets[:, None]).max(axis=0), np.float32)
+        """Return (h, w) the log-likelihood of pixels, from their terms (M, h, w)."""
+        each = self.weights @ terms.reshape(len(terms), -1) + self.offsets[:, None]
+        return np.asarray(each.max(axis=0), np.float32).reshape(terms.shape[1:])
 
 
 def label_from_seeds(
@@ -155,14 +159,14 @@ def coarse_labels(
             "to tell them apart"
         )
     height, width = seeds.shape
-    colour, flat = _standard_features(image, width, height)
+    colour, features = _standard_features(image, width, height)
     costs = edge_costs(blur(colour, _DENOISE_SIGMA), _COST_PER_PIXEL, _COST_PER_CONTRAST)
     distance = np.stack([seed_distance(costs, seeds == label) for label in classes], axis=-1)
     prior = -np.float32(settings.distance_weight) * np.minimum(distance, settings.distance_cap)
-    terms = polynomial_terms(flat)
+    terms = polynomial_terms(features)
     known = seeds
     for _ in range(settings.rounds):
-        evidence = class_evidence(flat, terms, known, classes, settings)
+        evidence = class_evidence(features, terms, known, classes, settings)
         probability = _probability(evidence, prior, seeds, classes, hair_allowed, settings)
         labels = np.take(np.asarray(classes, np.uint8), probability.argmax(axis=-1))
         known = _certain(labels, probability.max(axis=-1), seeds)
@@ -198,14 +202,14 @@ def label_from_probability(
     """
     prior = np.asarray(cv2.resize(probability, size, interpolation=cv2.INTER_CUBIC), np.float32)
     prior = np.clip(prior, np.float32(_LEAST_PROBABILITY), 1)
-    colour, flat = _standard_features(image, *size)
+    colour, features = _standard_features(image, *size)
     if corrections is not None:
         smooth = blur(colour, _DENOISE_SIGMA)
         costs = edge_costs(smooth, _COST_PER_PIXEL, _COST_PER_CONTRAST)
         prior = pull_prior(prior, costs, corrections)
     said = [] if corrections is None else [corrections.hair, corrections.rest]
     told = said if face is None else [face, *said]
-    posterior = _weigh_colours(prior, flat, told, BESIDE_A_PRIOR)
+    posterior = _weigh_colours(prior, features, told, BESIDE_A_PRIOR)
     labels = np.take(np.array(_ORDER, np.uint8), posterior.argmax(axis=-1))
     seeds = np.full_like(labels, UNKNOWN)
     if corrections is not None:
@@ -215,31 +219,32 @@ def label_from_probability(
 
 
 def _weigh_colours(
-    prior: Float32Array, flat: Float32Array, told: Sequence[BoolArray], settings: LabelSettings
+    prior: Float32Array, features: Float32Array, told: Sequence[BoolArray], settings: LabelSettings
 ) -> Float32Array:
     """Return the probability (h, w, 3), in `_ORDER`, by a prior and by the classes' colours.
 
-    `flat` are the features of the pixels; in the regions `told` colours do not count.
+    `features` (h, w, 8) are those of the pixels; in the regions `told` colours do not count.
     """
+    few, order = features[THINNED], np.array(_ORDER, np.uint8)
     posterior: Float32Array = prior / prior.sum(axis=-1, keepdims=True)
-    terms, order = polynomial_terms(flat), np.array(_ORDER, np.uint8)
-    for _ in range(settings.rounds):
-        sure = fold_last(np.maximum, posterior) > _SURE
-        known = np.where(sure, order[posterior.argmax(axis=-1)], np.uint8(UNKNOWN))
+    late = posterior[THINNED]
+    for part in (*[THINNED] * (settings.rounds - 1), np.s_[:, :]):
+        sure = fold_last(np.maximum, late) > _SURE
+        known = np.where(sure, order[late.argmax(axis=-1)], np.uint8(UNKNOWN))
         counts = [np.count_nonzero(known == label) for label in order]
         classes = [int(label) for label, n in zip(order, counts, strict=True) if n >= _FEWEST]
         if len(classes) < 2:
-            break
-        evidence = class_evidence(flat, terms, known, classes, settings)
-        relative = np.full(prior.shape, -settings.evidence_cap, np.float32)
+            return posterior
+        evidence = class_evidence(few, polynomial_terms(features[part]), known, classes, settings)
+        relative = np.full(prior[part].shape, -settings.evidence_cap, np.float32)
         relative[..., np.isin(order, classes)] = np.maximum(
             evidence - fold_last(np.maximum, evidence)[..., None], -settings.evidence_cap
         )
         for region in told:
-            relative[region] = 0
-        odds = prior * np.exp(blur(relative, _DENOISE_SIGMA))
-        posterior = odds / fold_last(np.add, odds)[..., None]
-    return posterior
+            relative[region[part]] = 0
+        odds = prior[part] * np.exp(blur(relative, _DENOISE_SIGMA))
+        late = odds / fold_last(np.add, odds)[..., None]
+    return late
 
 
 def fold_last(combine: np.ufunc, values: Float32Array) -> Float32Array:
@@ -251,11 +256,11 @@ def fold_last(combine: np.ufunc, values: Float32Array) -> Float32Array:
 def _standard_features(
     image: UInt8Array, width: int, height: int
 ) -> tuple[Float32Array, Float32Array]:
-    """Return the Lab picture (h, w, 3) and features (h w, 8) with mean 0 and deviation 1."""
+    """Return the Lab picture (h, w, 3) and features (h, w, 8) with mean 0 and deviation 1."""
     colour, features = appearance(image, width, height)
-    flat = features.reshape(height * width, -1)
-    flat = (flat - flat.mean(axis=0)) / (flat.std(axis=0) + np.float32(_LEAST_DEVIATION))
-    return colour, flat
+    mean, deviation = cv2.meanStdDev(features.reshape(-1, 1, features.shape[2]))
+    features = (features - mean[:, 0]) / (deviation[:, 0] + _LEAST_DEVIATION)
+    return colour, features.astype(np.float32)
 
 
 def appearance(image: UInt8Array, width: int, height: int) -> tuple[Float32Array, Float32Array]:
@@ -287,33 +292,32 @@ def class_evidence(
 ) -> Float32Array:
     """Return (h, w, K) the log-likelihood of every pixel under the mixture of each class.
 
-    Each mixture is learnt by k-means from the pixels of (h, w) `known` with its label; a pixel's
+    Each mixture is learnt by k-means from the pixels of (h', w') `known` with its label; a pixel's
     score is that of its best component, as in GrabCut.
 
     Parameters
     ----------
-    features : (N, F)
-        Of every pixel, each feature with mean 0 and deviation 1.
-    terms : (M, N)
-        From `polynomial_terms`.
+    features : (h', w', F)
+        Of pixels, each feature with mean 0 and deviation 1.
+    terms : (M, h, w)
+        From `polynomial_terms`, of these pixels or of more.
     """
-    evidence = np.empty((*known.shape, len(classes)), np.float32)
+    evidence = np.empty((*terms.shape[1:], len(classes)), np.float32)
     for index, label in enumerate(classes):
-        samples = features[known.ravel() == label]
+        samples = features[known == label]
         pick = np.random.default_rng(settings.seed).permutation(len(samples))[:_SAMPLES]
-        score = learn_mixture(samples[pick], settings).scores(terms)
-        evidence[..., index] = score.reshape(known.shape)
+        evidence[..., index] = learn_mixture(samples[pick], settings).scores(terms)
     return evidence
 
 
 def polynomial_terms(features: Float32Array) -> Float32Array:
-    """Return (M, N) the products of two features (N, F) and the features themselves.
+    """Return (M, h, w) the products of two features (h, w, F) and the features themselves.
 
     A normal distribution's log density is linear in these.
     """
-    rows = np.ascontiguousarray(features.T)
+    rows = np.ascontiguousarray(np.moveaxis(features, -1, 0))
     first, second = np.triu_indices(len(rows))
-    terms = np.empty((len(first) + len(rows), rows.shape[1]), np.float32)
+    terms = np.empty((len(first) + len(rows), *rows.shape[1:]), np.float32)
     for index, (one, other) in enumerate(zip(first, second, strict=True)):
         np.multiply(rows[one], rows[other], out=terms[index])
     terms[len(first) :] = rows

@@ -10,13 +10,16 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.arrays import UInt8Array
+from hairkit.arrays import Float32Array, Int32Array, UInt8Array
+from hairkit.cameras.depth_raster import front_values, mesh_depth
 from hairkit.field.isosurface import volume_surface
 from hairkit.grooming.densify import densify
 from hairkit.grooming.prepare_export import select_strands
 from hairkit.imaging.picture_file import write_picture
 from hairkit.pipeline.figure import AMBER, GREEN, RED, Figure
-from hairkit.rendering import Lights, Solid, draw_views
+from hairkit.rendering import Lights, draw_views
+from hairkit.rendering.framebuffer import SUPERSAMPLE, average_samples, supersample_camera
+from hairkit.rendering.picture import backdrop
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture
 from hairkit.types.evidence import Evidence
@@ -24,7 +27,6 @@ from hairkit.types.groom import Groom
 from hairkit.types.mask import HAIR, PERSON, Mask
 from hairkit.types.orientation import OrientationMap
 from hairkit.types.skin_look import SkinLook
-from hairkit.types.strands import Strands
 from hairkit.types.volume import Hull
 
 TILE_WIDTH = 160
@@ -39,10 +41,17 @@ HAIRS = 2500
 """Strands of the hair in the last row: a pixel of a tile is millimetres wide."""
 LEAST_WIDTH = 920
 """Width of a sheet of few photos, pixels, for the lines of health."""
-GUIDE_POINTS = 20
-"""Points a strand in the pictures."""
-CLAY = (0.16, 0.15, 0.14)
-"""Linear RGB of the hull."""
+HAIR_POINTS = 20
+"""Points of each of them."""
+GUIDE_STEP = 0.002
+"""Metres between the points that guides are drawn as."""
+CLAY = np.array((168, 162, 156))
+"""sRGB of hull and head where they face the camera, whose light is at the lens."""
+_LEVELS = np.indices((5, 5, 5)).reshape(3, -1).T / 4
+"""(125, 3) colours of a guide's direction: red runs left and right, green front and back, blue up
+and down, as in tractography."""
+_DARKER = 0.55
+"""Brightness of every other guide, so that neighbours can be told apart."""
 KEY_DIRECTION, RIM_DIRECTION = (0.4, 0.8, 0.6), (-0.4, 0.7, -0.6)
 """Towards the lights: one before the face, one behind the head, both from above."""
 KEY, SKY, GROUND = (1.3, 1.26, 1.2), (1.15, 1.15, 1.17), (0.72, 0.71, 0.7)
@@ -95,8 +104,8 @@ def contact_sheet(
         [mask_picture(photo, mask) for photo, mask in zip(photos, evidence.masks, strict=True)],
         [_hsv_picture(map_, size) for map_ in evidence.orientations],
         _hull_pictures(evidence.hull, cameras),
-        _hair_pictures(groom, groom.strands, cameras, show_direction=True),
-        _hair_pictures(groom, densify(groom, HAIRS), cameras, show_direction=False),
+        _guide_pictures(groom, cameras),
+        _hair_pictures(groom, cameras),
     )
     pictures = _arrange(rows, [view.name for view in capture.views], size)
     return np.concatenate([pictures, _health_lines(health, pictures.shape[1])])
@@ -148,30 +157,48 @@ def _hsv_picture(map_: OrientationMap, size: tuple[int, int]) -> UInt8Array:
 
 def _hull_pictures(hull: Hull, cameras: Sequence[Camera]) -> list[UInt8Array]:
     """Return the dense cells from each camera, as clay."""
-    vertices, faces, normals = volume_surface(hull.grid, hull.dense, step=2)  # a pixel is two cells
-    clay = Solid(
-        vertices,
-        faces,
-        normals,
-        np.tile(np.array(CLAY, np.float32), (len(vertices), 1)),
-        scatter=0.0,
-    )
-    nothing = Strands(np.empty((0, 3), np.float32), np.zeros(1, np.int64))
-    return draw_views(nothing, None, cameras, solids=[clay], lights=_lights())
+    vertices, faces, _ = volume_surface(hull.grid, hull.dense, step=2)  # a pixel is two cells
+    fine = [supersample_camera(camera, SUPERSAMPLE) for camera in cameras]
+    clay = [_clay(vertices, faces, camera) for camera in fine]
+    return [average_samples(*each) for each in zip(clay, cameras, strict=True)]
 
 
-def _hair_pictures(
-    groom: Groom, strands: Strands, cameras: Sequence[Camera], show_direction: bool
-) -> list[UInt8Array]:
-    """Return pictures of the groom's guides, or of its hair, on its head."""
+def _guide_pictures(groom: Groom, cameras: Sequence[Camera]) -> list[UInt8Array]:
+    """Return the guides from each camera, coloured by direction, on a head of clay."""
+    strands, head = groom.strands.resampled_by_length(GUIDE_STEP), groom.head
+    level = np.rint(4 * np.abs(strands.tangents()[:, [0, 2, 1]])).astype(np.int64)
+    other = np.repeat(np.arange(len(strands)) % 2, strands.counts)
+    values = (1 + level @ (25, 5, 1) + len(_LEVELS) * other).astype(np.uint8)
+    colours = 255 * np.concatenate([_LEVELS, _DARKER * _LEVELS])
+    pictures = []
+    for camera in cameras:
+        fine = supersample_camera(camera, SUPERSAMPLE)
+        picture = _clay(head.vertices, head.faces, fine)
+        front = front_values(fine, strands.points, values, head)
+        picture[front > 0] = colours[front[front > 0] - 1]
+        pictures.append(average_samples(picture, camera))
+    return pictures
+
+
+def _clay(vertices: Float32Array, faces: Int32Array, camera: Camera) -> UInt8Array:
+    """Return a picture (H, W, 3) of a mesh, as bright as it faces the camera (Lambert 1760)."""
+    depth, picture = mesh_depth(vertices, faces, camera), backdrop(camera)
+    shown = np.isfinite(depth)
+    down, right = np.gradient(np.where(shown, depth, depth[shown].max(initial=0)))
+    facing = 1 / np.hypot(1, camera.pixels_per_metre * np.hypot(down, right))
+    picture[shown] = facing[shown, None] * CLAY
+    return picture
+
+
+def _hair_pictures(groom: Groom, cameras: Sequence[Camera]) -> list[UInt8Array]:
+    """Return pictures of the groom's hair on its head."""
     return draw_views(
-        strands.resampled(GUIDE_POINTS),
+        densify(groom, HAIRS).resampled(HAIR_POINTS),
         groom.head,
         cameras,
         material=groom.material,
         lights=_lights(),
         bust=True,
-        show_direction=show_direction,
         skin=LOOK,
     )
 

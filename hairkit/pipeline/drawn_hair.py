@@ -32,6 +32,8 @@ DIRECTION_LIMIT = np.radians(20.0)
 PIECES, GUIDE_RADIUS, EDGE = 39, 0.003, 3
 """Pieces of a guide, the radius in metres within which it hides others, and the pixels that are
 taken off the hair: its edge has the direction of the outline."""
+POINTS = 4 * PIECES + 1
+"""Points of a guide that hide what is behind them; every fourth is the end of a piece."""
 BESIDE = 9
 """Pixels, twice of which half a guide may lie beside the hair of a mask."""
 LOCK, LEAST_LOCK, LOCK_SHARE, USUAL_GUIDES = 0.01, 0.004, 0.25, 600
@@ -65,17 +67,16 @@ class DrawnHair:
     """How much the photo's hair runs one way nearby, its median: 0 for no direction, up to 1."""
 
 
-def compare_drawing(groom: Groom, camera: Camera, mask: Mask, photo: UInt8Array) -> DrawnHair:
+def compare_drawing(groom: Groom, camera: Camera, shown: PhotoHair) -> DrawnHair:
     """Compare the guides that one view shows, hidden by no other guide and no head, with its photo.
 
-    Directions count over hair away from its edge, where the photo shows them more clearly than in
-    its median; guides run as photographed within `DIRECTION_LIMIT`.
+    Guides have `POINTS` points each. Directions count over hair away from its edge, where the photo
+    shows them more clearly than in its median; guides run as photographed within `DIRECTION_LIMIT`.
     """
-    shown = PhotoHair.of(photo, mask)
     small = camera.resized(*shown.hair.shape[::-1])
-    hair, judged = shown.hair, shown.judged
+    hair, judged, dense = shown.hair, shown.judged, groom.strands.points
     near = cv2.dilate(hair, np.ones((BESIDE, BESIDE), np.uint8)) > 0
-    head, dense = head_depth(groom.head, small), groom.strands.resampled(4 * PIECES).points
+    head = head_depth(groom.head, small)
     surface = np.minimum(point_depth(small, dense, GUIDE_RADIUS), head)
     places, way = _visible(groom, small, surface)
     drawn = np.isfinite(point_depth(small, dense))
@@ -121,17 +122,17 @@ class PhotoHair:
         return cls(hair, angle, sure, inner & (sure >= coherence), coherence)
 
 
-def share_oriented(found: OrientationMap, photo: UInt8Array, mask: Mask) -> float:
+def share_oriented(found: OrientationMap, shown: PhotoHair) -> float:
     """Return the share of the hair whose direction `found` tells, and not otherwise than the photo.
 
     Only hair counts whose direction the photo shows more clearly than in its median; where that is
     below `COHERENT`, any direction is taken for right. 1 where no hair is.
     """
-    shown = PhotoHair.of(photo, mask)
-    doubled = found.confidence * np.exp(2j * found.angle)
-    size = shown.hair.shape[::-1]
-    parts = np.dstack([doubled.real, doubled.imag, found.confidence]).astype(np.float32)
-    x, y, sure = np.moveaxis(cv2.resize(parts, size, interpolation=cv2.INTER_AREA), -1, 0)
+    size, doubled = shown.hair.shape[::-1], cv2.polarToCart(found.confidence, 2 * found.angle)
+    x, y, sure = (
+        cv2.resize(part, size, interpolation=cv2.INTER_AREA)
+        for part in (*doubled, found.confidence)
+    )
     along = np.asarray(angle_between(np.arctan2(y, x) / 2, shown.angle)) <= DIRECTION_LIMIT
     right = (sure > 0) & (along | (shown.sure < COHERENT))
     return share_of(right[shown.judged].sum(), shown.judged.sum())
@@ -144,7 +145,7 @@ def _visible(
 
     The way of a wave is that of its axis: from half a pitch before a piece to half a pitch behind.
     """
-    points = groom.strands.resampled(PIECES + 1).points.reshape(-1, PIECES + 1, 3)
+    points = groom.strands.points.reshape(-1, POINTS, 3)[:, :: (POINTS - 1) // PIECES]
     ends = camera.project(points)
     middle = ((ends[:, :-1] + ends[:, 1:]) / 2).reshape(-1, 2)
     places = np.nan_to_num(np.floor(middle), nan=-1).astype(np.int64)

@@ -16,7 +16,13 @@ import numpy as np
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.cameras.depth_raster import HEAD_TOLERANCE, SPLAT_CELLS, head_depth, point_depth
 from hairkit.field.growth_prior import PARTED_HAIR
-from hairkit.pipeline.drawn_hair import compare_drawing, share_of, share_oriented
+from hairkit.pipeline.drawn_hair import (
+    POINTS,
+    PhotoHair,
+    compare_drawing,
+    share_of,
+    share_oriented,
+)
 from hairkit.pipeline.figure import AMBER, GREEN, RED, Figure, Limits
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture, View
@@ -116,6 +122,7 @@ def assess(
     scene = replace(evidence.scene, names=tuple(_label(view) for view in capture.views))
     evidence = replace(evidence, scene=scene)  # notes speak of the user's own files
     masks, hull = evidence.masks, evidence.hull
+    shown = [PhotoHair.of(v.image, mask) for v, mask in zip(capture.views, masks, strict=True)]
     hair_length = evidence.scalp_distance.hair_length
     level = hair_length < PARTED_HAIR or evidence.tied.tails or evidence.waves.coiled
     return (
@@ -124,12 +131,12 @@ def assess(
         *assess_cameras(scene),
         *assess_masks(masks, scene),
         *assess_hull(hull, masks, scene),
-        *assess_orientations(capture, evidence),
+        *assess_orientations(shown, evidence),
         *(() if level else assess_parting(evidence.parting)),
         *assess_ties(evidence.tied, scene.head),
         *(assess_seen(groom.strands) if scene.one_sided else ()),
         *assess_strands(groom, roots, hair_length),
-        *assess_drawing(capture, masks, scene, groom),
+        *assess_drawing(shown, scene, groom),
     )
 
 
@@ -270,10 +277,9 @@ def compare_hull(hull: Hull, mask: Mask, camera: Camera, scene: Scene) -> tuple[
     return share_of((drawn & hair).sum(), hair.sum()), overlap
 
 
-def assess_orientations(capture: Capture, evidence: Evidence) -> tuple[Figure, ...]:
+def assess_orientations(shown: Sequence[PhotoHair], evidence: Evidence) -> tuple[Figure, ...]:
     """Return the share of the hair whose 2D orientations are those of the photos."""
-    rows = zip(evidence.orientations, capture.views, evidence.masks, strict=True)
-    shares = [share_oriented(found, view.image, mask) for found, view, mask in rows]
+    shares = [share_oriented(*row) for row in zip(evidence.orientations, shown, strict=True)]
     share, name = float(np.mean(shares)), _worst(evidence.scene.names, shares)
     note = f"its plugin does not see the strands of the photos, least of all in {name}"
     return (Figure("orient", "angles as photographed", share, "", ORIENTED.light(share), note),)
@@ -330,16 +336,13 @@ def assess_strands(groom: Groom, roots: int, hair_length: float) -> tuple[Figure
     )  # fmt: skip
 
 
-def assess_drawing(
-    capture: Capture, masks: Sequence[Mask], scene: Scene, groom: Groom
-) -> tuple[Figure, ...]:
+def assess_drawing(shown: Sequence[PhotoHair], scene: Scene, groom: Groom) -> tuple[Figure, ...]:
     """Return how the drawn guides agree with the photos: directions, where hair is, and curls.
 
     Directions of steep curls are not judged: their coils are not where those of the photos are.
     """
-    names, photos = scene.names, [view.image for view in capture.views]
-    rows = zip(scene.cameras, masks, photos, strict=True)
-    views = [compare_drawing(groom, *row) for row in rows]
+    names, groom = scene.names, replace(groom, strands=groom.strands.resampled(POINTS))
+    views = [compare_drawing(groom, *row) for row in zip(scene.cameras, shown, strict=True)]
     steep = groom.material.curl_radius * 2 * np.pi > groom.material.curl_pitch
     if not steep:
         shares = [share_of(view.right, view.judged) for view in views]

@@ -105,14 +105,9 @@ def draw_views(
     solids: Sequence[Solid] = (),
     bust: bool = False,
     supersample: int = SUPERSAMPLE,
-    show_direction: bool = False,
     skin: SkinLook | None = None,
 ) -> list[UInt8Array]:
-    """Return one picture for each camera, as `draw` does, but upload hair and head once.
-
-    With `show_direction` strands are coloured by their direction as in tractography: red runs left
-    and right, green front and back, blue up and down.
-    """
+    """Return one picture for each camera, as `draw` does, but upload hair and head once."""
     strands = hair.strands if isinstance(hair, Groom) else hair
     if isinstance(hair, Groom):
         head = hair.head if head is None else head
@@ -125,7 +120,6 @@ def draw_views(
     look = {
         "u_root_colour": tuple(material.root_colour.tolist()),
         "u_tip_colour": tuple(material.tip_colour.tolist()),
-        "u_show_direction": float(show_direction),
     }
     pictures = []
     with (

@@ -56,11 +56,13 @@ def estimate_scene(
     """Solve for all cameras; the head keeps its shape and gives the world its frame and scale."""
     problem = TurnFit.of(capture, masks, head, options)
     search = problem.search(options.iterations)
+    carries = options.carries if problem.landmarks is not None else 0
     if start is None:
         best = _from_nothing(problem, search, capture, options)
     else:
-        best = search.settle(problem.from_cameras(start.cameras))
-    for _ in range(options.carries if problem.landmarks is not None else 0):
+        best = problem.from_cameras(start.cameras)
+        best = best if carries else search.settle(best)
+    for _ in range(carries):
         transferred = _transferred(problem, capture, best)
         best = transferred.search(options.iterations).settle(best, 1)
     names = tuple(view.name for view in capture.views)
