@@ -41,6 +41,8 @@ HAIRS = 2500
 """Strands of the hair in the last row: a pixel of a tile is millimetres wide."""
 LEAST_WIDTH = 920
 """Width of a sheet of few photos, pixels, for the lines of health."""
+WIDER = np.float32(3)
+"""Factor of their width: they stand for all of the hair."""
 HAIR_POINTS = 20
 """Points of each of them."""
 GUIDE_STEP = 0.002
@@ -192,8 +194,10 @@ def _clay(vertices: Float32Array, faces: Int32Array, camera: Camera) -> UInt8Arr
 
 def _hair_pictures(groom: Groom, cameras: Sequence[Camera]) -> list[UInt8Array]:
     """Return pictures of the groom's hair on its head."""
+    hair = densify(groom, HAIRS).resampled(HAIR_POINTS)
+    assert hair.widths is not None  # densify gives them
     return draw_views(
-        densify(groom, HAIRS).resampled(HAIR_POINTS),
+        replace(hair, widths=WIDER * hair.widths),
         groom.head,
         cameras,
         material=groom.material,
