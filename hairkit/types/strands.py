@@ -192,7 +192,7 @@ class Strands(Previewed, Stored):
             shares = rank / np.repeat(counts - 1, counts)
         wanted = shares * np.repeat(length, counts)
         # a strictly ascending key over all strands
-        base = np.concatenate([[0.0], np.cumsum(length + 1.0)[:-1]])
+        base = np.concatenate([[0.0], np.cumsum(length + 1.0)])[:-1]
         key = arc + np.repeat(base, self.counts)
         target = wanted + np.repeat(base, counts)
         after = np.clip(
