@@ -1,6 +1,6 @@
 """A groom for the page: head, bust, hair and the guides that move it, as one block of bytes.
 
-Four bytes `HKS1`, the length of a JSON header (uint32, little-endian), the header padded to a
+Four bytes `HKS2`, the length of a JSON header (uint32, little-endian), the header padded to a
 multiple of four, then the arrays that it names with type, shape and place.
 """
 
@@ -26,11 +26,12 @@ from hairkit.rendering.head import Solid, bust_solid, head_solid
 from hairkit.rendering.light import EXPOSURE, Lights, hair_density, light_volume
 from hairkit.rendering.picture import display_width
 from hairkit.storage import write_bytes
+from hairkit.studio.project import PACKET
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.head import Head, Roots
 from hairkit.types.strands import Strands
 
-MAGIC = b"HKS1"
+MAGIC = PACKET.encode()
 HAIRS, POINTS = 9000, 16
 """Strands drawn and points of each: what a phone draws sixty times a second."""
 MOST_GUIDES = 700

@@ -41,6 +41,8 @@ from hairkit.types.chosen import Chosen, ChosenHair
 from hairkit.types.edits import Edits, read_edits
 
 STATE = "studio.json"
+PACKET = "HKS2"
+"""Kind of file in which pages get their hair; another one is made anew."""
 RESULT = "result"
 _BUILT = "studio.json"
 _LARGEST_STATE = 2**20
@@ -275,13 +277,14 @@ class Project:
         write_table(self.folder / "capture.toml", "hair", asdict(hair))
 
     def inputs(self) -> str:
-        """Return a text that changes whenever a file changes that a reconstruction reads."""
+        """Return a text that changes whenever a file does that a reconstruction reads, and when
+        pages read their hair otherwise."""
         files = [self.photo(shot) for shot in self.shots]
         files += sorted((self.folder / "strokes").glob("*.json"))
         files += sorted((self.folder / "masks").glob("*.png"))
         files += [self.folder / "landmarks.json", self.folder / "capture.toml"]
         files.append(self.folder / EDITS)
-        return json.dumps([facts_of(file) for file in files if file.is_file()])
+        return json.dumps([PACKET, *(facts_of(file) for file in files if file.is_file())])
 
     @property
     def built(self) -> str:

@@ -184,3 +184,16 @@ def test_photos_that_came_or_went_by_hand_are_found(
     again = Project(project.folder)
     assert [shot.file for shot in again.shots][-1] == "extra.jpg"
     assert len(read_capture(again.folder).views) == len(photos)
+
+
+def test_hair_of_another_version_is_made_again(
+    tmp_path: Path, photos: list[Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What pages cannot read is not the hair of the project's photos any more."""
+    project = filled(tmp_path / "p", photos[:1])
+    project.result.mkdir()
+    project.groom.write_bytes(b"hair")
+    project.set_built(project.inputs(), {})
+    assert project.built == project.inputs()
+    monkeypatch.setattr("hairkit.studio.project.PACKET", "HKS1")
+    assert project.built != project.inputs()

@@ -11,7 +11,9 @@ const NEAR = 0.05, FAR = 10, VIEW_ANGLE = 0.5; // metres, metres, radians
 
 export function readPacket(buffer) {
   const view = new DataView(buffer);
-  if (view.getUint32(0) !== 0x484b5331) throw new Error("no hair in this file");
+  if (view.getUint32(0) !== 0x484b5332) { // HKS2
+    throw new Error("this hair is of another version of hairkit; make it again on the page Photos");
+  }
   const size = view.getUint32(4, true);
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 8, size)));
   const arrays = {};
