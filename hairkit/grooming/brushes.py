@@ -26,8 +26,8 @@ from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 from hairkit.types.volume import VoxelGrid
 
-STEP = 0.25
-"""Distance, in radii, of the places along its path at which a brush acts."""
+STEP, MOST_STEPS = 0.25, 2000
+"""Distance, in radii, of the places along its path at which a brush acts, and how many at most."""
 CLEARANCE, ROUNDS = 0.001, 6
 """Metres that hair keeps from the head, and times that it is moved out and set to its lengths."""
 SHORTEST = 0.002
@@ -118,7 +118,7 @@ class Stroke(NamedTuple):
     """Where a brush goes, and how much it does there."""
 
     path: Float64Array
-    """(N, 3) places at most `STEP` radii apart, metres; none: everywhere."""
+    """(N, 3) places `STEP` radii apart or less, in long paths more, metres; none: everywhere."""
     radius: float
     amount: float
     pitch: float
@@ -266,7 +266,7 @@ def _strokes(edit: Edit, usual: float) -> list[Stroke]:
     setting, path = edit.setting, edit.path.astype(np.float64)
     if len(path) > 1:
         way = np.concatenate([[0], np.linalg.norm(np.diff(path, axis=0), axis=1).cumsum()])
-        count = max(int(np.ceil(way[-1] / (STEP * setting.radius))), 1) + 1
+        count = int(np.clip(np.ceil(way[-1] / (STEP * setting.radius)), 1, MOST_STEPS)) + 1
         path = np.stack([np.interp(np.linspace(0, way[-1], count), way, x) for x in path.T], 1)
     amount = usual if setting.amount is None else setting.amount
     sides = [path, path * MIRROR] if setting.mirror and len(path) else [path]

@@ -16,7 +16,14 @@ from scipy.spatial import cKDTree
 
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.errors import InputError
-from hairkit.grooming.locks import LockOptions, gather, strand_widths, turn_about, wander
+from hairkit.grooming.locks import (
+    USUAL_LOCKS,
+    LockOptions,
+    gather,
+    strand_widths,
+    turn_about,
+    wander,
+)
 from hairkit.head_model.scalp import roots_at, sample_roots
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.head import Roots
@@ -52,7 +59,7 @@ def densify(
     seed: int = 0,
     *,
     roots: Roots | npt.ArrayLike | None = None,
-    locks: LockOptions | None = LockOptions(),  # noqa: B008 (frozen)
+    locks: LockOptions | None = USUAL_LOCKS,
     material: HairMaterial | None = None,
 ) -> Strands:
     """Return `count` strands: the guides first, then hair interpolated between them.

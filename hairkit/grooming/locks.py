@@ -46,6 +46,9 @@ class LockOptions:
     curl: float = option(0.4, low=0, high=1, doc="Share by which waves differ from hair to hair.")
 
 
+USUAL_LOCKS = LockOptions()
+
+
 def gather(
     curves: Float32Array, middles: Float32Array, reach: float, hold: Float32Array
 ) -> tuple[Float32Array, Int64Array]:

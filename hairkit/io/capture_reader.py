@@ -59,6 +59,8 @@ add nothing."""
 
 EDITS = "edits.json"
 """File of a capture with strokes of brushes, see `hairkit.grooming.brushes`."""
+BESIDE = ("landmarks.json", "capture.toml", EDITS)
+"""Files of a capture that belong to no single photo."""
 
 WORKING_EDGE = 1440
 """Long edge in pixels that photos are scaled down to."""

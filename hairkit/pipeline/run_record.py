@@ -15,6 +15,7 @@ from types import MappingProxyType
 from typing import Any, get_args
 
 from hairkit.errors import FormatError
+from hairkit.io.capture_reader import BESIDE
 from hairkit.io.head_reader import HeadFile
 from hairkit.manager import Manager
 from hairkit.manager.command_plugin import PluginCommand
@@ -240,8 +241,7 @@ def input_files(capture: Capture) -> list[Path]:
     named = [path for v in views for path in (v.photo_path, v.mask_path, v.strokes_path)]
     source = capture.source
     if source is not None:
-        beside = (source / "landmarks.json", source / "capture.toml")
-        named += [source, *beside]
+        named += [source, *(source / name for name in BESIDE)]
     return [path for path in dict.fromkeys(named) if path is not None and path.is_file()]
 
 

@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from hairkit.errors import HairkitError, InputError
-from hairkit.io.capture_reader import EDITS, FEWEST, MOST, NAMES
+from hairkit.io.capture_reader import BESIDE, EDITS, FEWEST, MOST, NAMES
 from hairkit.io.capture_toml import (
     HeadEntry,
     ViewEntry,
@@ -282,8 +282,7 @@ class Project:
         files = [self.photo(shot) for shot in self.shots]
         files += sorted((self.folder / "strokes").glob("*.json"))
         files += sorted((self.folder / "masks").glob("*.png"))
-        files += [self.folder / "landmarks.json", self.folder / "capture.toml"]
-        files.append(self.folder / EDITS)
+        files += [self.folder / name for name in BESIDE]
         return json.dumps([PACKET, *(facts_of(file) for file in files if file.is_file())])
 
     @property

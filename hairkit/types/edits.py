@@ -16,8 +16,8 @@ from hairkit.storage import Stored, read_bytes
 
 MOST_BYTES = 2**24
 """Of a file of edits: some thousand strokes."""
-MOST_POINTS = 10_000
-"""Of the path of one stroke."""
+MOST_STROKES, MOST_POINTS = 1000, 10_000
+"""Of a head, and of the path of one stroke."""
 
 
 @dataclass(frozen=True)
@@ -64,8 +64,8 @@ class Edits(Stored):
 
         Raises `InputError`, which says `where` and which stroke is wrong.
         """
-        if not isinstance(values, list):
-            raise InputError(f"{where}: expected a list of strokes")
+        if not (isinstance(values, list) and len(values) <= MOST_STROKES):
+            raise InputError(f"{where}: expected a list of at most {MOST_STROKES} strokes")
         return cls(tuple(_edit(each, f"{where}: stroke {k + 1}") for k, each in enumerate(values)))
 
     def values(self) -> list[dict[str, Any]]:

@@ -125,6 +125,13 @@ def test_hair_of_all_lengths_is_taken() -> None:
     np.testing.assert_allclose(made.lengths(), strands.lengths(), rtol=1e-4)
 
 
+def test_a_path_of_any_length_ends() -> None:
+    """A path of 1e30 m by the finest brush is walked in bounded time."""
+    far = np.array([[1e30, 0, 0], [0, 0.1, 0], [-1e30, 0, 0]])
+    made = brushed(GROOM.strands, Edit(far, Brush("comb", 0.001)))
+    np.testing.assert_array_equal(made.points, GROOM.strands.points)
+
+
 def test_edits_are_kept_in_a_file(tmp_path: Path) -> None:
     """What is written comes back; every fault names the file and the stroke."""
     cut, everywhere = Brush("cut", 0.02, mirror=True), np.zeros((0, 3))
@@ -141,6 +148,7 @@ def test_edits_are_kept_in_a_file(tmp_path: Path) -> None:
         ('[{"path": [[1e999, 0, 0]]}]', "stroke 1: the path"),
         ('[{"radius": -1}]', "radius"),
         ("{}", "expected a list"),
+        (str([{}] * 1001), "at most 1000 strokes"),
     ):
         path.write_text(f'{{"strokes": {strokes_}}}')
         with pytest.raises(InputError, match=words) as caught:

@@ -14,19 +14,7 @@ import pytest
 from ball import RECIPE
 from hairkit_plugins import brushes
 
-from hairkit import (
-    Brush,
-    Capture,
-    Edit,
-    Edits,
-    Groom,
-    Mask,
-    Roots,
-    ScalpDistance,
-    Strands,
-    Waves,
-    hookimpl,
-)
+from hairkit import Capture, Groom, Mask, Roots, ScalpDistance, Strands, Waves, hookimpl
 from hairkit.errors import InputError, PluginError, RenderError
 from hairkit.manager import Manager
 from hairkit.pipeline.recipe import parse_recipe
@@ -35,6 +23,7 @@ from hairkit.pipeline.run_record import RECORD, read_record
 from hairkit.storage import to_arrays
 from hairkit.testing import ball_head, turn_capture, turn_scene
 from hairkit.types.chosen import Chosen, ChosenHair
+from hairkit.types.edits import Brush, Edit, Edits
 from hairkit.types.scene import read_cameras
 
 STAGES = ["segment", "scene", "fit", "orient", "hull", "field", "track"]

@@ -13,12 +13,13 @@ from ball import PLUGIN_FILE, RECIPE, write_capture
 import hairkit
 from hairkit.cli import main
 from hairkit.errors import FormatError, InputError
+from hairkit.io.capture_reader import read_capture
 from hairkit.io.head_reader import write_head_obj
 from hairkit.manager import Manager
 from hairkit.pipeline.recipe import parse_recipe
 from hairkit.pipeline.reconstruct import reconstruct
 from hairkit.pipeline.rerun import changed_versions, rerun
-from hairkit.pipeline.run_record import RECORD, read_record
+from hairkit.pipeline.run_record import RECORD, input_files, read_record
 from hairkit.storage import write_text
 from hairkit.testing import ball_head, turn_capture
 
@@ -158,3 +159,17 @@ def test_records_name_stages_as_they_were_called(tmp_path: Path) -> None:
     new, old = (read_record(tmp_path / name).as_recipe() for name in (RECORD, "old.json"))
     assert new.stages == old.stages
     assert new.stage("fit") is not None
+
+
+def test_what_lies_beside_the_photos_is_recorded(tmp_path: Path) -> None:
+    """Landmarks, choices and strokes count among the files of a run, where they are."""
+    folder = write_capture(tmp_path / "c")
+    written = {
+        "landmarks.json": '{"views": {}}',
+        "capture.toml": "",
+        "edits.json": '{"strokes": []}',
+    }
+    assert not set(written) & {path.name for path in input_files(read_capture(folder))}
+    for name, text in written.items():
+        (folder / name).write_text(text)
+    assert set(written) <= {path.name for path in input_files(read_capture(folder))}
