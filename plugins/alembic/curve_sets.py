@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,14 +15,12 @@ from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.errors import FormatError
 from hairkit.io.spline_curves import cubic_map, nurbs_map
 
-from .archive import Archive, Object, Property, tag
-from .transforms import compose_transform
+from .contents import Object, Values, read_objects
 
 _CUBIC, _LINEAR, _NON_PERIODIC = 0, 1, 0
 _CUBIC_ORDER = 4
 _BASES = {1: "bezier", 2: "bspline", 3: "catmullRom"}
 """Alembic's numbers of bases (`AbcGeom::BasisType`)."""
-_MOST_LEVELS = 100
 _IDENTITY = np.eye(4)
 
 _log = logging.getLogger("hairkit")
@@ -62,54 +60,35 @@ def read_curve_sets(path: Path) -> list[CurveSet]:
     InputError
         The file is missing, or of the HDF5 kind.
     """
-    archive = Archive.open(path)
-    sets = [
-        found
-        for node, world in _walk(archive)
-        if node.is_a("AbcGeom_Curve") and (found := _curve_set(node, world)) is not None
-    ]
+    curves = (each for each in read_objects(path) if each.is_a("AbcGeom_Curve"))
+    sets = [found for each in curves if (found := _curve_set(each)) is not None]
     if not sets:
         raise FormatError(f"{path}: an Alembic file without curves")
     return sets
 
 
-def _walk(archive: Archive) -> Iterator[tuple[Object, Float64Array]]:
-    """Yield every object and its transform to the world, parents first, in the file's order."""
-    waiting: list[tuple[Object, Float64Array, int]] = [(archive.top(), _IDENTITY, 0)]
-    while waiting:
-        node, above, level = waiting.pop()
-        if level > _MOST_LEVELS:
-            raise archive.file.error(f"objects lie more than {_MOST_LEVELS} levels deep")
-        world = compose_transform(above, node)
-        yield node, world
-        below = [(child, world, level + 1) for child in node.objects()]
-        waiting += below[::-1]
-
-
-def _curve_set(node: Object, world: Float64Array) -> CurveSet | None:
-    geometry = node.properties().get(".geom")
-    found = geometry.properties() if geometry else {}
-    points = found["P"].float32() if "P" in found else None
+def _curve_set(node: Object) -> CurveSet | None:
+    found, world = node.values, node.world
+    points = found["P"].floats() if "P" in found else None
     if points is None:
         return None
     counts = _counts(found, points, node)
-    values = _Values(node, counts)
+    values = _Spread(node, counts)
     spline, plain = _spline(found, counts, node)
-    attributes = found[".arbGeomParams"].properties() if ".arbGeomParams" in found else {}
-    widths = values.per_point(attributes.get("groom_width"), 1)
+    widths = values.per_point(found.get("groom_width"), 1)
     if widths is None:
         widths = values.per_point(found.get("width"), 1)
-    uv = values.per_strand(attributes.get("groom_root_uv"), 2, "f")
+    uv = values.per_strand(found.get("groom_root_uv"), 2, "f")
     if uv is None:
         uv = values.per_strand(found.get("uv"), 2, "f")
-    group = values.per_strand(attributes.get("groom_group_id"), 1, "i")
-    guide = values.per_strand(attributes.get("groom_guide"), 1, "i")
+    group = values.per_strand(found.get("groom_group_id"), 1, "i")
+    guide = values.per_strand(found.get("groom_guide"), 1, "i")
     return CurveSet(
         points=_move(_on_curve(spline, points), world),
         counts=counts,
         widths=None if widths is None else _scale(_on_curve(spline, widths)[:, 0], world),
         root_uv=uv,
-        colour=_on_curve(spline, values.per_point(attributes.get("groom_color"), 3)),
+        colour=_on_curve(spline, values.per_point(found.get("groom_color"), 3)),
         group=None if group is None else group[:, 0],
         guide=None if guide is None else guide[:, 0],
         frames=found["P"].samples,
@@ -117,20 +96,18 @@ def _curve_set(node: Object, world: Float64Array) -> CurveSet | None:
     )
 
 
-def _counts(found: dict[str, Property], points: Float32Array, node: Object) -> Int64Array:
+def _counts(found: Mapping[str, Values], points: Float32Array, node: Object) -> Int64Array:
     counts = found["nVertices"].integers() if "nVertices" in found else None
     if points.shape[1] != 3 or counts is None or counts.min() < 0:
-        raise node.archive.file.error(f"{node.name} has no points or counts of points")
+        raise node.error("has no points or counts of points")
     # each count is at most the number of points, so that their sum cannot overflow
     if counts.max() > len(points) or counts.sum() != len(points):
-        raise node.archive.file.error(
-            f"{node.name} has {len(points)} points, its curves ask for another number"
-        )
+        raise node.error(f"has {len(points)} points, its curves ask for another number")
     return counts[:, 0]
 
 
 def _spline(
-    found: Mapping[str, Property], counts: Int64Array, node: Object
+    found: Mapping[str, Values], counts: Int64Array, node: Object
 ) -> tuple[Any | None, bool]:
     """Return the map (P, P) from control points to points on the curves, and whether all is told.
 
@@ -149,9 +126,10 @@ def _spline(
         order = np.full(len(counts), _CUBIC_ORDER) if orders is None else orders.ravel()
         weights = found["w"].floats() if "w" in found else None
         if len(order) != len(counts) or (weights is not None and len(weights) != counts.sum()):
-            raise node.archive.file.error(f"{node.name} has orders or weights of other curves")
-        rational = None if weights is None else weights.ravel()
-        return nurbs_map(counts, order, knots.ravel(), rational, node.name), True
+            raise node.error("has orders or weights of other curves")
+        rational = None if weights is None else weights.ravel().astype(np.float64)
+        places = knots.ravel().astype(np.float64)
+        return nurbs_map(counts, order, places, rational, node.name), True
     if kind == _LINEAR or _BASES.get(basis) == "catmullRom":
         return None, True
     if kind != _CUBIC or basis not in _BASES:
@@ -182,13 +160,13 @@ def _scale(widths: Float32Array, world: Float64Array) -> Float32Array:
     return scaled
 
 
-class _Values:
+class _Spread:
     """Values of geometry parameters, spread to points or strands by their scope."""
 
     def __init__(self, node: Object, counts: Int64Array) -> None:
         self.node, self.counts = node, counts
 
-    def per_point(self, header: Property | None, extent: int) -> Any:
+    def per_point(self, header: Values | None, extent: int) -> Any:
         """Return (P, extent) float32 or None."""
         values = self._values(header, extent, "f")
         if values is None:
@@ -198,7 +176,7 @@ class _Values:
             return np.repeat(values[:1], self.counts.sum(), axis=0)
         return np.repeat(values, self.counts, axis=0) if scope == "uni" else values
 
-    def per_strand(self, header: Property | None, extent: int, kind: str) -> Any:
+    def per_strand(self, header: Values | None, extent: int, kind: str) -> Any:
         """Return (S, extent) float32 or int64, of values at points the root's, or None."""
         values = self._values(header, extent, kind)
         if values is None:
@@ -211,32 +189,25 @@ class _Values:
         roots = np.minimum(np.cumsum(self.counts) - self.counts, len(values) - 1)
         return values[roots]
 
-    def _values(self, header: Property | None, extent: int, kind: str) -> npt.NDArray[Any] | None:
-        """Return (N, extent) the values, of an indexed parameter those that it names."""
+    def _values(self, header: Values | None, extent: int, kind: str) -> npt.NDArray[Any] | None:
+        """Return (N, extent) the values."""
         if header is None:
             return None
-        parts = header.properties()
-        header = parts.get(".vals", header)
-        values: npt.NDArray[Any] | None = header.integers() if kind == "i" else header.float32()
-        index = parts[".indices"].integers() if ".indices" in parts else None
-        if values is not None and index is not None:
-            if index.min() < 0 or index.max() >= len(values):
-                raise self.node.archive.file.error(f"{header.name} has bad indices")
-            values = values[index[:, 0]]
+        values: npt.NDArray[Any] | None = header.integers() if kind == "i" else header.floats()
         if values is None or values.shape[1] != extent:
             if header.samples:
                 _log.warning("%s of %s is of another type; left out", header.name, self.node.name)
             return None
         return values
 
-    def _scope(self, header: Property | None, have: int) -> str:
+    def _scope(self, header: Values | None, have: int) -> str:
         """Return the scope by the number of values, which the metadata only breaks ties of."""
         sizes = {"con": 1, "uni": len(self.counts), "vtx": int(self.counts.sum())}
         fitting = [scope for scope, size in sizes.items() if size == have]
-        said = "" if header is None else tag(header.metadata, "geoScope")
+        said = "" if header is None else header.scope
         if not fitting:
-            raise self.node.archive.file.error(
-                f"{self.node.name} has {have} values of {header.name if header else ''} for"
+            raise self.node.error(
+                f"has {have} values of {header.name if header else ''} for"
                 f" {sizes['uni']} curves of {sizes['vtx']} points"
             )
         return said if said in fitting else fitting[-1]
