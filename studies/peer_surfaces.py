@@ -117,10 +117,7 @@ def _with_points(case: Case, points: Array, quick: Peers, slow: Peers) -> Iterat
 
 
 def distances(size: float) -> Iterator[Case]:
-    """The distance in every cell of a grid, compared up to `BAND` from the surface.
-
-    Without its sign: Open3D counts crossings by twos, so that points in two bodies are outside.
-    """
+    """The distance in every cell of a grid, compared up to `BAND` from the surface."""
     head = default_head()
     vertices, faces = closed_surface(head)
     grid = VoxelGrid.around([-0.12, -0.2, -0.13], [0.12, 0.13, 0.15], CELL / size ** (1 / 3))
@@ -134,14 +131,9 @@ def distances(size: float) -> Iterator[Case]:
         inside = np.abs(igl.fast_winding_number(vertices, corners, centres)) > 0.5
         return np.where(inside, -far, far).reshape(grid.shape)
 
-    def open3d_distance() -> Array:
-        scene = _open3d_scene(vertices, faces)
-        found = scene.compute_signed_distance(_tensor(centres), nsamples=3).numpy()
-        return np.asarray(found).reshape(grid.shape)
-
     def apart(ours: Array, theirs: Array) -> float:
         near = np.abs(theirs) < BAND
-        return 1e3 * largest(np.abs(ours[near]), np.abs(theirs[near]))
+        return 1e3 * largest(ours[near], theirs[near])
 
     yield Case(
         "`signed_distance`",
@@ -149,7 +141,6 @@ def distances(size: float) -> Iterator[Case]:
         lambda: signed_distance(head, grid),
         {
             "`igl.point_mesh_squared_distance`, `fast_winding_number`": igl_distance,
-            "Open3D `compute_signed_distance`": open3d_distance,
         },
         apart,
         f"mm up to {1e3 * BAND:.0f} mm away",
