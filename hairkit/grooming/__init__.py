@@ -6,6 +6,7 @@ Make a groom of tracked or imported strands, thin it out or fill it up, and prep
 * `assemble`: strands, head and photo colours put together as a groom
 * `brushes`: strands combed, cut and curled by strokes over them
 * `cover_hair`: strands led through hair that no other reaches
+* `curve_sets`: curves of files with several objects as strands
 * `decimate`: guides chosen from full hair
 * `densify`: full hair interpolated between guides
 * `engine_files`: what an engine takes of a groom
