@@ -10,13 +10,10 @@ import numpy as np
 import numpy.typing as npt
 from peer_cases import Case, largest, share_differing
 from scipy import ndimage
-from scipy.spatial import cKDTree
 
 from hairkit.cameras.depth_raster import mesh_depth
 from hairkit.field import isosurface
 from hairkit.head_model.bvh import build_tree, inside_surface, nearest_on_surface
-from hairkit.head_model.free_points import take_free
-from hairkit.head_model.scalp import evaluate
 from hairkit.head_model.signed_distance import BAND, closed_surface, signed_distance
 from hairkit.head_model.template import default_head
 from hairkit.types.camera import Camera
@@ -189,40 +186,6 @@ def depth_maps(size: float) -> Iterator[Case]:
     )
 
 
-def spread_points(size: float) -> Iterator[Case]:
-    """Points of a sequence of which no two are nearer than a radius, taken in turn."""
-    head, rng = default_head(), np.random.default_rng(0)
-    faces = np.flatnonzero(head.scalp[head.faces].min(axis=1) > 0.5)
-    count = int(200_000 * size)
-    weights = rng.dirichlet(np.ones(3), count)
-    points = evaluate(head, rng.choice(faces, count).astype(np.int32), weights)
-
-    def ours() -> Array:
-        taken = np.empty(count, np.int64)
-        return taken[: take_free(points, np.full(count, np.inf), APART, taken, 0)]
-
-    def plain() -> Array:
-        free, near = np.ones(count, bool), cKDTree(points).query_ball_point(points, APART)
-        for i in range(count):
-            if free[i]:
-                free[near[i]] = False
-                free[i] = True
-        return np.flatnonzero(free)
-
-    def apart(found: Array, other: Array) -> float:
-        return float(len(np.setxor1d(found, other)))
-
-    yield Case(
-        "`take_free`",
-        f"{count:,} points, {1e3 * APART:g} mm apart",
-        ours,
-        {"`cKDTree.query_ball_point` and a loop": plain},
-        apart,
-        "points",
-        0.0,
-    )
-
-
 def isosurfaces(size: float) -> Iterator[Case]:
     """The smooth surface of a volume of cells; vertices of ours to the other mesh."""
     grid = VoxelGrid.around([-0.12, -0.2, -0.13], [0.12, 0.13, 0.15], CELL / size ** (1 / 3))
@@ -276,7 +239,6 @@ CASES: list[Callable[[float], Iterator[Case]]] = [
     insides,
     distances,
     depth_maps,
-    spread_points,
     isosurfaces,
 ]
 """Functions of the size of the input, 1 for the usual one."""
