@@ -15,14 +15,15 @@ from hairkit.grooming.adopt_strands import ImportOptions, adopt, pack_strands
 from hairkit.head_model.scalp import bind
 from hairkit.io.glb_file import GlbFile, readable
 from hairkit.io.glb_skin import material_maps, shape_offsets
+from hairkit.io.plain_settings import capsules_of, made, ties_of
 from hairkit.io.polylines import join_segments
 from hairkit.io.textures import as_maps
-from hairkit.types.groom import Groom
+from hairkit.types.groom import Groom, HairMaterial, HairPhysics
 from hairkit.types.head import Head
 from hairkit.types.skin import Blendshape
 from hairkit.types.strands import Strands
 
-from .extras import VERSION, capsules_of, material_of, physics_of, ties_of, with_landmarks
+from .extras import VERSION, with_extras
 from .meshes import JOINTS
 from .options import Options
 
@@ -70,8 +71,8 @@ def read_gltf_groom(path: str | os.PathLike[str], options: Options) -> Groom:
             )
         strands = _strands(parts, path)
         head = _own_head(file, own) if own else None
-        material = material_of(own) if own else None
-        physics = physics_of(own) if own else None
+        material = made(HairMaterial, own["material"]) if own else None
+        physics = made(HairPhysics, own["physics"]) if own else None
         ties = ties_of(own) if own else ()
     if head is not None and options.head is None and material is not None:
         triangle, barycentric = bind(strands.roots, head)
@@ -282,4 +283,4 @@ def _own_head(file: GlbFile, own: dict[str, Any]) -> Head | None:
             ).items()
         ),
     )
-    return with_landmarks(head, own)
+    return with_extras(head, own)

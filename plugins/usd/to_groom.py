@@ -22,13 +22,15 @@ from hairkit.grooming.curve_sets import (
     strands_of,
 )
 from hairkit.io.coordinate_space import FileSpace
+from hairkit.io.glb_file import readable
+from hairkit.io.plain_settings import made, ties_of
 from hairkit.io.spline_curves import BASES, cubic_map, nurbs_map
-from hairkit.types.groom import Groom
+from hairkit.types.groom import Groom, HairMaterial, HairPhysics
 
 from .body_reading import read_head
 from .guarded import Contents, contents
 from .options import Options
-from .settings import material_from, physics_from, ties_from
+from .settings import plain_settings_of
 
 _log = logging.getLogger("hairkit")
 
@@ -44,19 +46,18 @@ def read_groom(path: Path, options: Any) -> Groom:
     space = _space(found, options, path)
     with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused
         every = [_curves(found, curves, space, path) for curves in found.description["curves"]]
-        head = read_head(found, space, path)
+        with readable(path, "USD groom"):
+            settings = plain_settings_of(found.description["settings"])
+            head = read_head(found, settings, space, path)
     every = [curves for curves in every if len(curves.counts)]
     if not every:
         raise FormatError(f"{path}: holds no BasisCurves or NurbsCurves with points")
     strands, kept = strands_of(join_sets(every), path)
-    settings = found.description["settings"]
-    material = material_from(settings, path) or mean_look(strands, kept.colour)
-    groom = adopt(strands, options, path, material, head)
-    groom = replace(
-        groom,
-        physics=physics_from(settings, path) or groom.physics,
-        ties=ties_from(settings, path),
-    )
+    with readable(path, "USD groom"):
+        look, physics = settings.get("material"), made(HairPhysics, settings.get("physics", {}))
+        material = made(HairMaterial, look) if look else mean_look(strands, kept.colour)
+        ties = ties_of(settings)
+    groom = replace(adopt(strands, options, path, material, head), physics=physics, ties=ties)
     return _bound(groom, kept, options) if head is not None else groom
 
 
