@@ -1,4 +1,4 @@
-"""Curves of files with several objects: values spread to points and strands, sets joined."""
+"""Curves of files: values spread to points and strands, sets joined, and strands made of them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Int64Array
 from hairkit.errors import FormatError
-from hairkit.grooming.adopt_strands import pack_strands, rows_kept
+from hairkit.grooming.adopt_strands import pack_strands
 from hairkit.types.strands import Strands
 
 CONSTANT, UNIFORM, VERTEX = "constant", "uniform", "vertex"
@@ -26,15 +26,15 @@ class CurveSet:
     """(P, 3)."""
     counts: Int64Array
     """(S,) points of each curve."""
-    widths: Float32Array | None
+    widths: Float32Array | None = None
     """(P,) diameters."""
-    root_uv: Float32Array | None
+    root_uv: Float32Array | None = None
     """(S, 2)."""
-    colour: Float32Array | None
+    colour: Float32Array | None = None
     """(P, 3)."""
-    group: Int64Array | None
+    group: Int64Array | None = None
     """(S,)."""
-    guide: Int64Array | None
+    guide: Int64Array | None = None
     """(S,)."""
     triangle: Int64Array | None = None
     """(S,) the head's face under each root."""
@@ -106,7 +106,9 @@ def strands_of(joined: CurveSet, source: object) -> tuple[Strands, CurveSet]:
     Raises `FormatError` as it does, and for groups that 32 bits do not hold.
     """
     strands, kept = pack_strands(joined.points, joined.counts, source)
-    rows = rows_kept(joined.counts, kept)
+    rows: Any = slice(None)
+    if len(kept) < len(joined.counts):
+        rows = np.repeat(joined.counts >= 2, joined.counts)
     if joined.group is not None and np.abs(joined.group).max() > np.iinfo(np.int32).max:
         raise FormatError(f"{source}: a group of number {np.abs(joined.group).max()}")
     parts: dict[str, Any] = {}
