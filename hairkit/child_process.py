@@ -25,7 +25,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy.typing as npt
+
 from hairkit.errors import HairkitError, one_line
+from hairkit.storage import read_npz
 from hairkit.system import (
     kill_group,
     limit_process,
@@ -324,6 +327,22 @@ def ask_once(
     if "error" in answer:
         raise ChildError(f"failed: {shortened(str(answer['error']))}")
     return dict(answer["result"])
+
+
+def ask_for_arrays(
+    program: Path,
+    question: Mapping[str, Any],
+    limits: Limits,
+    address_bytes: int | None = None,
+) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
+    """Return the result of `ask_once`, and the arrays that the program wrote.
+
+    It is told in `target` to which .npz file; there are none where it wrote no file.
+    """
+    with call_folder() as folder:
+        target = Path(folder) / "arrays.npz"
+        answer = ask_once(program, {**question, "target": str(target)}, limits, address_bytes)
+        return answer, read_npz(target) if target.exists() else {}
 
 
 def call_folder() -> tempfile.TemporaryDirectory[str]:

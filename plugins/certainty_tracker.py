@@ -15,13 +15,11 @@ import numpy as np
 
 from hairkit import Hull, OrientationField, Roots, Strands, hookimpl
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
-from hairkit.field.sampling_kernels import make_unit, principal_direction, sample_at
+from hairkit.field.sampling_kernels import copy_point, principal_direction, sample_at
 from hairkit.grooming.head_collision import push_out_of_head
 from hairkit.options import option
 from hairkit.parallel import compiled, compiled_with, parallel_for
 
-ROOT_STEPS = 4
-"""Steps from the root on which `root_inertia` acts."""
 MIN_STRANDS = 32
 """Least number of strands worth a call on another thread."""
 _PARALLEL = 1e-3
@@ -51,9 +49,6 @@ class Options:
         high=90,
         unit="deg",
         doc="Angle by which the scalp's normal is bent down for the first direction (G).",
-    )
-    root_inertia: float = option(
-        0.0, low=0, high=0.95, doc="Share of the previous direction in the first four steps."
     )
     max_length: float = option(1.2, low=0.01, high=5, unit="m", doc="Longest strand.")
     smoothing: int = option(5, low=0, high=50, doc="Passes of the smoothing filter.")
@@ -119,8 +114,6 @@ class Rules(NamedTuple):
     """Of a turn in one step, below which the step is uncertain."""
     max_score: int
     """Score after a certain step."""
-    root_inertia: float
-    """Share of the previous direction in the first `ROOT_STEPS` steps."""
 
 
 def _grow(
@@ -130,7 +123,7 @@ def _grow(
     step = options.step * field.grid.spacing
     volumes = Volumes(field.grid.origin, field.grid.spacing, field.tensors(), hull.dense)
     least = float(np.cos(np.radians(options.max_turn_deg)))
-    rules = Rules(step, least, options.max_score, options.root_inertia)
+    rules = Rules(step, least, options.max_score)
     steps = max(int(options.max_length / step + _WHOLE), 1)
     points = np.zeros((len(roots), steps + 1, 3), np.float32)
     counts = np.zeros(len(roots), np.int64)
@@ -184,10 +177,7 @@ def track_strand(
                 cosine = found[0] * d[0] + found[1] * d[1] + found[2] * d[2]
                 if cosine >= rules.min_cosine:
                     score = rules.max_score
-                    keep = rules.root_inertia if i <= ROOT_STEPS else 0.0
-                    for axis in range(3):
-                        d[axis] = keep * d[axis] + (1 - keep) * found[axis]
-                    make_unit(d)
+                    copy_point(found, d)
         for axis in range(3):
             p[axis] += rules.step * d[axis]
         points[i] = p

@@ -21,10 +21,9 @@ from hairkit.grooming.adopt_strands import (
     ImportOptions,
     adopt,
     mean_look,
-    pack_strands,
     plain_widths,
-    rows_kept,
 )
+from hairkit.grooming.curve_sets import CurveSet, strands_of
 from hairkit.grooming.prepare_export import ExportOptions, prepare_export
 from hairkit.hookspecs import hookimpl
 from hairkit.io.byte_reader import ByteReader, finite
@@ -96,14 +95,13 @@ def import_groom(path: Path, options: Options) -> Groom:
     if arrays & TRANSPARENCY:
         reader.array("<f4", total, "transparency")
     colours = reader.array("<f4", (total, 3), "colours") if arrays & COLOURS else None
-    strands, kept = pack_strands(space.points_to_head(points), counts, path)
-    rows = rows_kept(counts, kept)
     if widths is not None:
-        widths = plain_widths(widths, space.metres, path)[rows]
-        strands = Strands(strands.points, strands.offsets, widths)
+        widths = plain_widths(widths, space.metres, path)
     if colours is not None:
-        colours = finite(colours, path, "colours")[rows]
-    return adopt(strands, options, path, _material(header, strands, colours, space))
+        colours = finite(colours, path, "colours")
+    curves = CurveSet(space.points_to_head(points), counts, widths, colour=colours)
+    strands, kept = strands_of(curves, path)
+    return adopt(strands, options, path, _material(header, strands, kept.colour, space))
 
 
 def _pieces(groom: Groom, options: Options) -> Iterator[memoryview]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import codecs
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +21,7 @@ from hairkit.grooming.prepare_export import ExportOptions, prepare_export
 from hairkit.hookspecs import hookimpl
 from hairkit.io.coordinate_space import FileSpace, SpaceOptions
 from hairkit.io.file_format import Feature, FileFormat
-from hairkit.io.number_text import format_rows, read_numbers, strip_slots, whole_digits
+from hairkit.io.number_text import format_rows, read_numbers
 from hairkit.io.polylines import chains
 from hairkit.io.strand_blocks import blocks
 from hairkit.storage import read_bytes, write_pieces
@@ -66,15 +67,11 @@ def _pieces(strands: Strands, space: FileSpace) -> Iterator[bytes]:
     yield b"# hair strands, written by hairkit\n"
     for block in blocks(strands):
         points = space.points_to_file(strands.points[block.points])
-        yield format_rows(b"v %.9g %.9g %.9g\n", points)[0]
+        yield format_rows(b"v %.9g %.9g %.9g\n", points)
     for block in blocks(strands):
-        start = block.points.start
-        digits = whole_digits(np.arange(start + 1, block.points.stop + 1))
-        around = np.zeros((3, digits.shape[1]), np.uint8)
-        around[0, strands.offsets[:-1][block.strands] - start] = ord("l")
-        around[1] = ord(" ")
-        around[2, strands.offsets[1:][block.strands] - 1 - start] = ord("\n")
-        yield strip_slots(np.concatenate([around[:2], digits, around[2:]]))[0]
+        ends = strands.offsets[block.strands.start : block.strands.stop + 1] + 1
+        lines = (" ".join(map(str, range(*pair))) for pair in pairwise(ends.tolist()))
+        yield "".join(f"l {line}\n" for line in lines).encode("ascii")
 
 
 def _elements(text: str) -> tuple[list[str], list[str], list[int]]:

@@ -9,23 +9,23 @@ orders, with strands or with edges alone.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.arrays import Float32Array, Int64Array
+from hairkit.arrays import Float32Array
 from hairkit.colour import linear_from_srgb, srgb_from_linear
 from hairkit.errors import InputError
 from hairkit.grooming.adopt_strands import (
     ImportOptions,
     adopt,
     mean_look,
-    pack_strands,
     plain_widths,
-    rows_kept,
 )
+from hairkit.grooming.curve_sets import CurveSet, strands_of
 from hairkit.grooming.prepare_export import ExportOptions, prepare_export
 from hairkit.hookspecs import hookimpl
 from hairkit.io.byte_reader import finite
@@ -36,7 +36,6 @@ from hairkit.io.ply_elements import columns, read_elements, strand_order, vertex
 from hairkit.io.strand_blocks import blocks, colours
 from hairkit.storage import read_bytes, write_pieces
 from hairkit.types.groom import Groom
-from hairkit.types.strands import Strands
 
 FORMAT = FileFormat(
     "PLY",
@@ -85,18 +84,21 @@ def import_groom(path: Path, options: Options) -> Groom:
     points = finite(vertex_points(elements, path), path, "vertices")
     vertex = elements["vertex"]
     order, counts = strand_order(elements, len(points), path)
-    strands, kept = pack_strands(options.space.points_to_head(points[order]), counts, path)
-    rows = rows_kept(counts, kept)
-    widths = None
+    widths, shades = None, None
     if "thickness" in vertex:
-        widths = plain_widths(vertex["thickness"], options.space.metres, path)[order][rows]
-    strands = Strands(strands.points, strands.offsets, widths)
-    strands = _with_strand_values(strands, elements.get("strand", {}), kept, path)
-    colours = None
+        widths = plain_widths(vertex["thickness"], options.space.metres, path)[order]
     if {name for name, _ in _COLOUR} <= set(vertex):
-        stored = np.stack([vertex[name] for name, _ in _COLOUR], axis=1)[order][rows]
-        colours = _LINEAR[stored] if stored.dtype == np.uint8 else None
-    return adopt(strands, options, path, mean_look(strands, colours))
+        stored = np.stack([vertex[name] for name, _ in _COLOUR], axis=1)[order]
+        shades = _LINEAR[stored] if stored.dtype == np.uint8 else None
+    curves = CurveSet(
+        options.space.points_to_head(points[order]),
+        counts,
+        widths,
+        colour=shades,
+        **_strand_values(elements.get("strand", {}), path),
+    )
+    strands, kept = strands_of(curves, path)
+    return adopt(strands, options, path, mean_look(strands, kept.colour))
 
 
 def _pieces(groom: Groom, space: FileSpace) -> Iterator[bytes | memoryview]:
@@ -141,19 +143,11 @@ def _header(points: int, strands: int) -> str:
     return "\n".join([*lines, "end_header", ""])
 
 
-def _with_strand_values(
-    strands: Strands, values: dict[str, npt.NDArray[np.generic]], kept: Int64Array, path: Path
-) -> Strands:
-    """Return the strands with the root uv, groups and guide flags that the file has."""
-    group, guide = None, None
-    uv = columns(values, ("u", "v"))
-    if uv is not None:
-        uv = finite(uv[kept], path, "root uv")
-    if "group" in values:
-        group = finite(values["group"], path, "groups")[kept].astype(np.int32)
-    if "guide" in values:
-        guide = values["guide"][kept] != 0
-    return replace(strands, root_uv=uv, group=group, guide=guide)
+def _strand_values(values: dict[str, npt.NDArray[np.generic]], path: Path) -> dict[str, Any]:
+    """Return the root uv, groups and guide flags that the file has."""
+    found: dict[str, Any] = {name: values.get(name) for name in ("group", "guide")}
+    found["root_uv"] = columns(values, ("u", "v"))
+    return {name: finite(held, path, name) for name, held in found.items() if held is not None}
 
 
 def _to_bytes(colours: Float32Array) -> npt.NDArray[np.uint8]:

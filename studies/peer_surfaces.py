@@ -10,13 +10,10 @@ import numpy as np
 import numpy.typing as npt
 from peer_cases import Case, largest, share_differing
 from scipy import ndimage
-from scipy.spatial import cKDTree
 
 from hairkit.cameras.depth_raster import mesh_depth
 from hairkit.field import isosurface
 from hairkit.head_model.bvh import build_tree, inside_surface, nearest_on_surface
-from hairkit.head_model.free_points import take_free
-from hairkit.head_model.scalp import evaluate
 from hairkit.head_model.signed_distance import BAND, closed_surface, signed_distance
 from hairkit.head_model.template import default_head
 from hairkit.types.camera import Camera
@@ -117,10 +114,7 @@ def _with_points(case: Case, points: Array, quick: Peers, slow: Peers) -> Iterat
 
 
 def distances(size: float) -> Iterator[Case]:
-    """The distance in every cell of a grid, compared up to `BAND` from the surface.
-
-    Without its sign: Open3D counts crossings by twos, so that points in two bodies are outside.
-    """
+    """The distance in every cell of a grid, compared up to `BAND` from the surface."""
     head = default_head()
     vertices, faces = closed_surface(head)
     grid = VoxelGrid.around([-0.12, -0.2, -0.13], [0.12, 0.13, 0.15], CELL / size ** (1 / 3))
@@ -134,14 +128,9 @@ def distances(size: float) -> Iterator[Case]:
         inside = np.abs(igl.fast_winding_number(vertices, corners, centres)) > 0.5
         return np.where(inside, -far, far).reshape(grid.shape)
 
-    def open3d_distance() -> Array:
-        scene = _open3d_scene(vertices, faces)
-        found = scene.compute_signed_distance(_tensor(centres), nsamples=3).numpy()
-        return np.asarray(found).reshape(grid.shape)
-
     def apart(ours: Array, theirs: Array) -> float:
         near = np.abs(theirs) < BAND
-        return 1e3 * largest(np.abs(ours[near]), np.abs(theirs[near]))
+        return 1e3 * largest(ours[near], theirs[near])
 
     yield Case(
         "`signed_distance`",
@@ -149,7 +138,6 @@ def distances(size: float) -> Iterator[Case]:
         lambda: signed_distance(head, grid),
         {
             "`igl.point_mesh_squared_distance`, `fast_winding_number`": igl_distance,
-            "Open3D `compute_signed_distance`": open3d_distance,
         },
         apart,
         f"mm up to {1e3 * BAND:.0f} mm away",
@@ -195,40 +183,6 @@ def depth_maps(size: float) -> Iterator[Case]:
         apart,
         "% of the pixels by 0.1 mm",
         0.1,
-    )
-
-
-def spread_points(size: float) -> Iterator[Case]:
-    """Points of a sequence of which no two are nearer than a radius, taken in turn."""
-    head, rng = default_head(), np.random.default_rng(0)
-    faces = np.flatnonzero(head.scalp[head.faces].min(axis=1) > 0.5)
-    count = int(200_000 * size)
-    weights = rng.dirichlet(np.ones(3), count)
-    points = evaluate(head, rng.choice(faces, count).astype(np.int32), weights)
-
-    def ours() -> Array:
-        taken = np.empty(count, np.int64)
-        return taken[: take_free(points, np.full(count, np.inf), APART, taken, 0)]
-
-    def plain() -> Array:
-        free, near = np.ones(count, bool), cKDTree(points).query_ball_point(points, APART)
-        for i in range(count):
-            if free[i]:
-                free[near[i]] = False
-                free[i] = True
-        return np.flatnonzero(free)
-
-    def apart(found: Array, other: Array) -> float:
-        return float(len(np.setxor1d(found, other)))
-
-    yield Case(
-        "`take_free`",
-        f"{count:,} points, {1e3 * APART:g} mm apart",
-        ours,
-        {"`cKDTree.query_ball_point` and a loop": plain},
-        apart,
-        "points",
-        0.0,
     )
 
 
@@ -285,7 +239,6 @@ CASES: list[Callable[[float], Iterator[Case]]] = [
     insides,
     distances,
     depth_maps,
-    spread_points,
     isosurfaces,
 ]
 """Functions of the size of the input, 1 for the usual one."""

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.arrays import BoolArray, Float32Array, Float64Array, UInt8Array
+from hairkit.arrays import BoolArray, Float64Array, UInt8Array
 from hairkit.cameras.depth_raster import head_depth, point_depth
-from hairkit.cameras.projection_kernels import PackedCamera, pack_camera, project
 from hairkit.errors import InputError
 from hairkit.evaluation.depth_map import Surface, first_surface
 from hairkit.evaluation.scores import Samples
 from hairkit.imaging.masked_filters import coherent_truth
-from hairkit.parallel import compiled, parallel_for
 from hairkit.types.camera import Camera
 from hairkit.types.head import Head
 from hairkit.types.orientation import OrientationMap, angle_between
@@ -28,8 +26,6 @@ VISIBLE_DEPTH = 0.003
 """A drawn sample is visible at most this far behind the first surface, metres."""
 DIRECTION_STEP = 1e-3
 """Metres along a strand's tangent over which its direction in the picture is taken."""
-MIN_SAMPLES = 4096
-"""Least number of samples that are worth another thread."""
 DRAWN_FOOTPRINT_PX = 9
 """Edge of the square a drawn sample hides: guides are few, and must hide those of the far side."""
 HAIR_WIDTH = 0.0015
@@ -173,12 +169,17 @@ def judge_directions(
         raise InputError(
             f"true orientation has shape {truth.shape}, its camera {surface.depth.shape}"
         )
-    view = _TrueView(pack_camera(camera), surface.depth, truth)
     verdict = np.full(len(samples.points), HIDDEN, np.uint8)
-    parallel_for(
-        _judge, len(verdict), view, samples.points, samples.directions,
-        np.radians(DIRECTION_LIMIT_DEG), verdict, min_chunk=MIN_SAMPLES,
-    )  # fmt: skip
+    seen = np.flatnonzero(surface.behind(samples.points) <= VISIBLE_DEPTH)
+    points = samples.points[seen].astype(np.float64)
+    start = camera.project(points)
+    columns, rows = start.astype(np.int64).T
+    way = camera.project(points + DIRECTION_STEP * samples.directions[seen]) - start
+    gap = np.degrees(
+        angle_between(np.arctan2(way[:, 1], way[:, 0]), truth_angle(truth[rows, columns]))
+    )
+    judged = np.where(gap <= DIRECTION_LIMIT_DEG, RIGHT, WRONG)
+    verdict[seen] = np.where(truth[rows, columns] == 0, HIDDEN, judged)
     return DrawnDirections(verdict)
 
 
@@ -195,43 +196,3 @@ def _resize_like(
         return image
     size = (like.shape[1], like.shape[0])
     return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_NEAREST_EXACT))
-
-
-class _TrueView(NamedTuple):
-    """Reference images of one view."""
-
-    camera: PackedCamera
-    depth: Float32Array
-    """(H, W) first surface, metres."""
-    truth: UInt8Array
-    """(H, W) true orientation, see `truth_angle`; 0 where there is no hair."""
-
-
-@compiled
-def _judge(
-    first: int,
-    last: int,
-    view: _TrueView,
-    points: Float32Array,
-    directions: Float32Array,
-    limit: float,
-    verdict: UInt8Array,
-) -> None:
-    """Write the verdict on each visible sample; `limit` is in radians."""
-    height, width = view.depth.shape
-    for i in range(first, last):
-        x, y, z = points[i, 0], points[i, 1], points[i, 2]
-        u, v, d = project(view.camera, x, y, z)
-        if not (u >= 0 and v >= 0 and u < width and v < height):
-            continue
-        value = view.truth[int(v), int(u)]
-        if value == 0 or d - view.depth[int(v), int(u)] > VISIBLE_DEPTH:
-            continue
-        u2, v2, _ = project(
-            view.camera,
-            x + DIRECTION_STEP * directions[i, 0],
-            y + DIRECTION_STEP * directions[i, 1],
-            z + DIRECTION_STEP * directions[i, 2],
-        )
-        gap = ((value - 0.5) / 255 * np.pi - np.arctan2(v2 - v, u2 - u)) % np.pi
-        verdict[i] = RIGHT if min(gap, np.pi - gap) <= limit else WRONG

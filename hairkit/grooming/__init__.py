@@ -6,6 +6,7 @@ Make a groom of tracked or imported strands, thin it out or fill it up, and prep
 * `assemble`: strands, head and photo colours put together as a groom
 * `brushes`: strands combed, cut and curled by strokes over them
 * `cover_hair`: strands led through hair that no other reaches
+* `curve_sets`: curves of files as strands, with values of points and strands
 * `decimate`: guides chosen from full hair
 * `densify`: full hair interpolated between guides
 * `engine_files`: what an engine takes of a groom
@@ -14,7 +15,7 @@ Make a groom of tracked or imported strands, thin it out or fill it up, and prep
 * `head_collision`: strand points pushed out of the head
 * `lead_to_ties`: strands led to their tie and down the tail
 * `locks`: how hair lies in locks, and strays from them
-* `postprocess`: smoothing, waves and head collision after tracking
+* `postprocess`: ties, waves and head collision after tracking
 * `prepare_export`: choice of strands and defaults for exporters
 * `target_rules`: what engines demand of a hair file
 * `wind_waves`: measured waves put onto strands

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from hairkit.arrays import BoolArray, Float32Array, Int64Array
+from hairkit.arrays import Float32Array, Int64Array
 from hairkit.errors import FormatError, InputError
 from hairkit.grooming.prepare_export import shorter_than
 from hairkit.head_model.placement import find_place, place_head
@@ -37,7 +37,6 @@ __all__ = [
     "place_head",
     "plain_widths",
     "reverse_strands",
-    "rows_kept",
 ]
 
 SMALLEST, LARGEST = 0.015, 0.6
@@ -93,15 +92,6 @@ def pack_strands(
         points = points[np.repeat(keep, counts)]
     offsets = np.concatenate([[0], np.cumsum(counts[keep])])
     return Strands(points, offsets), np.flatnonzero(keep)
-
-
-def rows_kept(counts: Int64Array, kept: Int64Array) -> BoolArray | slice:
-    """Return which of the file's points (P,) belong to the strands that `pack_strands` kept."""
-    if len(kept) == len(counts):
-        return slice(None)
-    keep = np.zeros(len(counts), bool)
-    keep[kept] = True
-    return np.repeat(keep, counts)
 
 
 def plain_widths(thickness: npt.NDArray[Any], metres: float, source: object) -> Float32Array:

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
-from hairkit.arrays import Float32Array, Float64Array
-from hairkit.field.sampling_kernels import copy_point, gradient_at, sample_at
-from hairkit.parallel import compiled_with, parallel_for
+from hairkit.arrays import Float32Array, Float64Array, unit_vectors
 from hairkit.types.strands import Strands
 from hairkit.types.volume import VoxelGrid
 
@@ -17,8 +14,6 @@ ROUNDS = 3
 """Times that a point is moved along the gradient of the sampled distance."""
 FULL_AFTER = 0.004
 """Metres from the root after which a strand keeps its whole distance from the head."""
-MIN_POINTS = 2048
-"""Least number of points that are worth another thread."""
 
 
 def push_out_of_head(
@@ -29,43 +24,20 @@ def push_out_of_head(
     `distance` (X, Y, Z) is the signed one to the head in the cells of the grid. The clearance grows
     from 0 at the root: a strand that keeps all of it at once would leave the skin upright.
     """
-    points = strands.points.copy()
+    points = strands.points.astype(np.float64)
     apart = clearance * np.minimum(strands.arc_lengths() / FULL_AFTER, 1.0)
     apart[strands.offsets[:-1]] = -np.inf
-    field = _HeadDistance(grid.origin, float(grid.spacing), distance[..., None])
-    parallel_for(_push_points, len(points), field, apart, points, min_chunk=MIN_POINTS)
-    return replace(strands, points=points)
+    near = np.arange(len(points))
+    for _ in range(ROUNDS):
+        lack = apart[near] - grid.sample(distance, points[near])
+        near, lack = near[lack > 0], lack[lack > 0]
+        points[near] += lack[:, None] * outward(grid, distance, points[near])
+    return replace(strands, points=points.astype(np.float32))
 
 
-class _HeadDistance(NamedTuple):
-    """Signed distance to the head on a grid."""
-
-    origin: Float64Array
-    """(3,) corner of the grid, metres."""
-    spacing: float
-    """Edge of a cell, metres."""
-    values: Float32Array
-    """(X, Y, Z, 1) metres, negative inside."""
-
-
-@compiled_with(allocates=True)
-def _push_points(
-    first: int,
-    last: int,
-    head: _HeadDistance,
-    apart: Float64Array,
-    points: Float32Array,
-) -> None:
-    """Move points (P, 3) along the distance's gradient until they are `apart` (P,) off."""
-    p, level, normal = np.empty(3), np.empty(1), np.empty(3)
-    for i in range(first, last):
-        copy_point(points[i], p)
-        for _ in range(ROUNDS):
-            sample_at(head.origin, head.spacing, head.values, p, level)
-            lack = apart[i] - level[0]
-            if lack <= 0:
-                break
-            gradient_at(head.origin, head.spacing, head.values, p, normal)
-            for axis in range(3):
-                p[axis] += lack * normal[axis]
-                points[i, axis] = p[axis]
+def outward(grid: VoxelGrid, distance: Float32Array, points: Float64Array) -> Float64Array:
+    """Return (N, 3) unit vectors along which a distance (X, Y, Z) grows most, 0 where flat."""
+    steps = grid.spacing * np.eye(3)
+    ends = [[grid.sample(distance, points + way * step) for way in (1, -1)] for step in steps]
+    slope = np.stack([after - before for after, before in ends], axis=1)
+    return unit_vectors(slope.astype(np.float64))

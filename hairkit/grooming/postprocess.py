@@ -1,4 +1,4 @@
-"""Last steps of every tracker: lead the strands to their tie, smooth, wave, push them outside."""
+"""Last steps of every tracker: lead the strands to their tie, wave, push them outside."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ from hairkit.arrays import Float32Array, Float64Array
 from hairkit.grooming.head_collision import push_out_of_head
 from hairkit.grooming.lead_to_ties import lead_to_ties
 from hairkit.grooming.wind_waves import LARGEST_RADIUS, add_waves, grown_share
-from hairkit.helices import smooth_strands
 from hairkit.options import option
 from hairkit.types.strands import Strands
 from hairkit.types.tie import TiedHair
@@ -24,13 +23,6 @@ class FinishOptions:
     """Options that trackers share; plugins inherit them."""
 
     clearance: float = option(0.001, low=0, high=0.02, unit="m", doc="Distance kept from the head.")
-    helix_tolerance: float = option(
-        0.0,
-        low=0,
-        high=0.01,
-        unit="m",
-        doc="Smooth strands by helix arcs within this mean distance; 0: leave them.",
-    )
     waves: bool = option(True, doc="Wind the strands into the waves measured in the photos.")
     points: int = option(64, low=2, high=255, doc="Points of every strand; equal segments.")
 
@@ -51,13 +43,11 @@ def finish(
     field: OrientationField,
     options: FinishOptions,
 ) -> Strands:
-    """Lead strands to their ties, smooth them by helices, wave them, push them out of the head.
+    """Lead strands to their ties, wave them if the options ask for it, push them out of the head.
 
-    Smoothing and waves only where the options ask for it; `options.points` is used by the tracker.
+    `options.points` is used by the tracker.
     """
     strands = lead_to_ties(strands, tied, hull, field)
-    if options.helix_tolerance > 0:
-        strands = smooth_strands(strands, options.helix_tolerance)
     if options.waves:
         strands = add_waves(make_room(strands, waves, hull), waves)
     return push_out_of_head(strands, hull.grid, hull.head_distance, options.clearance)

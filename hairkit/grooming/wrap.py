@@ -8,20 +8,18 @@ pieces, and slides along the head where it would enter it.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
-from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array
+from hairkit.arrays import Float32Array, Float64Array, Int32Array, unit_vectors
 from hairkit.errors import InputError
-from hairkit.field.sampling_kernels import copy_point, gradient_at, sample_at
+from hairkit.grooming.head_collision import outward
 from hairkit.head_model.bvh import build_tree, nearest_on_surface
 from hairkit.head_model.carry_scalp import Carrier
 from hairkit.head_model.register_head import HeadMap, Surface, register_head
 from hairkit.head_model.scalp import evaluate, roots_at
 from hairkit.head_model.signed_distance import signed_distance
 from hairkit.io.head_reader import BareHead
-from hairkit.parallel import compiled, compiled_with, parallel_for
 from hairkit.types.groom import Groom
 from hairkit.types.head import Capsules, Head
 from hairkit.types.strands import Strands
@@ -42,8 +40,6 @@ MAP_MARGIN = 0.02
 """Metres around the strands that these points reach."""
 TIE_STEP = 0.01
 """Metres along a tie's axis over which its direction is mapped."""
-MIN_STRANDS = 64
-"""Least number of strands that are worth another thread."""
 
 
 def wrap_groom(groom: Groom, head: BareHead, *, keep_root_uv: bool = False) -> Groom:
@@ -127,34 +123,37 @@ def _carried_tie(tie: Tie, heads: HeadMap) -> Tie:
     )
 
 
-class _Laying(NamedTuple):
-    """What strands are laid in."""
-
-    origin: Float64Array
-    """(3,) corner of the grid, metres."""
-    spacing: float
-    """Edge of a cell, metres."""
-    distance: Float32Array
-    """(X, Y, Z, 1) signed distance to the head, metres, negative inside."""
-    offsets: Int64Array
-    """(S + 1,) first points of the strands."""
-    arc: Float64Array
-    """(P,) metres from each point to its root along the strand."""
-
-
 def _lay(strands: Strands, head: Head, heads: HeadMap, roots: Float64Array) -> Strands:
     """Return the strands on the other head, from roots (S, 3)."""
     points = _mapped(strands.points, heads)
     owner = strands.strand_of_point
     points += (roots - points[strands.offsets[:-1]])[owner]
     grid = _grid_around(points, head)
-    distance = signed_distance(head, grid)[..., None]
-    laying = _Laying(
-        grid.origin, float(grid.spacing), distance, strands.offsets, strands.arc_lengths()
-    )
-    laid = points.copy()
-    parallel_for(_lay_strands, len(strands), laying, points, laid, min_chunk=MIN_STRANDS)
+    laid = _laid(points, strands, grid, signed_distance(head, grid))
     return replace(strands, points=laid.astype(np.float32))
+
+
+def _laid(
+    mapped: Float64Array, strands: Strands, grid: VoxelGrid, distance: Float32Array
+) -> Float64Array:
+    """Return points (P, 3) laid in the directions of the mapped ones, around the head.
+
+    `distance` (X, Y, Z) is the signed one to the head in the cells of the grid.
+    """
+    laid, arc = mapped.copy(), strands.arc_lengths()
+    for rank in range(1, int(strands.counts.max(initial=0))):
+        here = strands.offsets[:-1][strands.counts > rank] + rank
+        before, length = laid[here - 1], (arc[here] - arc[here - 1])[:, None]
+        at = before + length * unit_vectors(mapped[here] - mapped[here - 1])
+        clearance = CLEARANCE * np.minimum(arc[here] / LIFTED_OVER, 1.0)
+        near = np.arange(len(at))
+        for _ in range(SLIDES):
+            lack = clearance[near] - grid.sample(distance, at[near])
+            near, lack = near[lack > 0], lack[lack > 0]
+            away = at[near] + lack[:, None] * outward(grid, distance, at[near]) - before[near]
+            at[near] = before[near] + length[near] * unit_vectors(away)
+        laid[here] = at
+    return laid
 
 
 def _mapped(points: Float32Array, heads: HeadMap) -> Float64Array:
@@ -179,50 +178,3 @@ def _grid_around(points: Float64Array, head: Head) -> VoxelGrid:
         raise InputError("the strands lie beside the head; is it in the same unit and upright?")
     spacing = max(CELL, float(np.cbrt(np.prod(high - low) / MOST_CELLS)))
     return VoxelGrid.around(low, high, spacing)
-
-
-@compiled_with(allocates=True)
-def _lay_strands(
-    first: int, last: int, laying: _Laying, mapped: Float64Array, laid: Float64Array
-) -> None:
-    """Lay strands in the directions of the mapped points (P, 3), around the head."""
-    p, before, aim = np.empty(3), np.empty(3), np.empty(3)
-    for strand in range(first, last):
-        begin = laying.offsets[strand]
-        copy_point(mapped[begin], before)
-        copy_point(mapped[begin], laid[begin])
-        for i in range(begin + 1, laying.offsets[strand + 1]):
-            length = laying.arc[i] - laying.arc[i - 1]
-            for axis in range(3):
-                aim[axis] = mapped[i, axis] - mapped[i - 1, axis]
-            _step(before, aim, length, p)
-            lifted = min(laying.arc[i] / LIFTED_OVER, 1.0)
-            _slide(laying, before, length, CLEARANCE * lifted, p)
-            copy_point(p, laid[i])
-            copy_point(p, before)
-
-
-@compiled
-def _step(start: Float64Array, aim: Float64Array, length: float, p: Float64Array) -> None:
-    """Write the point (3,) at a length from the start in the direction of the aim."""
-    size = np.sqrt(aim[0] ** 2 + aim[1] ** 2 + aim[2] ** 2)
-    share = length / size if size > 0 else 0.0
-    for axis in range(3):
-        p[axis] = start[axis] + share * aim[axis]
-
-
-@compiled_with(allocates=True)
-def _slide(
-    laying: _Laying, before: Float64Array, length: float, clearance: float, p: Float64Array
-) -> None:
-    """Move a point out of the head, at a length from the one before it."""
-    level, normal, away = np.empty(1), np.empty(3), np.empty(3)
-    for _ in range(SLIDES):
-        sample_at(laying.origin, laying.spacing, laying.distance, p, level)
-        lack = clearance - level[0]
-        if lack <= 0:
-            return
-        gradient_at(laying.origin, laying.spacing, laying.distance, p, normal)
-        for axis in range(3):
-            away[axis] = p[axis] + lack * normal[axis] - before[axis]
-        _step(before, away, length, p)

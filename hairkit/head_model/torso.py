@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, fields
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array
-from hairkit.parallel import compiled, parallel_for
 from hairkit.types.head import Head
 from hairkit.types.torso_shape import TorsoShape
 from hairkit.types.volume import VoxelGrid
@@ -94,20 +92,23 @@ class Torso(TorsoShape):
         """
         heights = np.linspace(RINGS[-1, 0], RINGS[0, 0], _TABLE) * 1e-3
         breadth, deep, ahead, left, level = self._sections(heights)
-        even = np.linspace(level[0], level[-1], _TABLE)
         less = depth / self.scale
-        sections = Sections(
-            even - less,
-            np.maximum(np.interp(even, level, breadth) - less, _THINNEST),
-            np.maximum(np.interp(even, level, deep) - less, _THINNEST),
-            np.interp(even, level, ahead),
-            np.interp(even, level, left),
+        centres = (np.arange(size) + 0.5 for size in grid.shape)
+        x0, y0, z0 = (
+            (low + at * grid.spacing - joint) / self.scale
+            for low, at, joint in zip(grid.origin, centres, self.joint, strict=True)
         )
-        first = (grid.origin + 0.5 * grid.spacing - self.joint) / self.scale
-        turn = float(np.cos(self.yaw)), float(np.sin(self.yaw)), float(self.roll)
-        cells = Cells(first, float(grid.spacing / self.scale), *turn)
-        found = np.zeros(grid.shape, np.bool_)
-        parallel_for(_mark_inside, grid.shape[0], cells, sections, found)
+        cosine, sine = np.cos(self.yaw), np.sin(self.yaw)
+        x, z = cosine * x0[:, None] - sine * z0, cosine * z0 + sine * x0[:, None]
+        height = y0[:, None] + less - self.roll * x[:, None]
+        found: BoolArray = height <= level[-1]
+        column = np.nonzero(found)[::2]
+        across, along = (
+            np.abs(place[column] - np.interp(height[found], level, middle))
+            / np.maximum(np.interp(height[found], level, half) - less, _THINNEST)
+            for place, middle, half in ((x, left, breadth), (z, ahead, deep))
+        )
+        found[found] = across**EXPONENT + along**EXPONENT < 1
         return found
 
     def _sections(self, height: Float64Array) -> tuple[Float64Array, ...]:
@@ -155,69 +156,3 @@ def loft(rings: int, around: int) -> Int32Array:
     c, d = a + around, b + around
     faces = np.concatenate([np.stack([a, c, b], -1), np.stack([b, c, d], -1)])
     return faces.reshape(-1, 3).astype(np.int32)
-
-
-class Sections(NamedTuple):
-    """Sections of a torso at even levels, in metres of an adult with the torso's shape."""
-
-    levels: Float64Array
-    """(T,) rising."""
-    breadth: Float64Array
-    """(T,) half breadth."""
-    depth: Float64Array
-    """(T,) half depth."""
-    ahead: Float64Array
-    """(T,) middle along z, in the chest's axes."""
-    left: Float64Array
-    """(T,) middle along x."""
-
-
-class Cells(NamedTuple):
-    """Position of a grid's cells relative to the torso's joint, in units of the torso's size."""
-
-    first: Float64Array
-    """(3,) centre of the first cell."""
-    spacing: float
-    """Edge of a cell."""
-    cosine: float
-    """Of the yaw of the chest."""
-    sine: float
-    """Of the yaw."""
-    roll: float
-    """Rise of the shoulders per length to the left."""
-
-
-@compiled
-def _mark_inside(
-    begin: int, stop: int, cells: Cells, sections: Sections, inside: BoolArray
-) -> None:
-    """Mark the cells inside of the torso in the layers `begin` to `stop` along x."""
-    last = len(sections.levels) - 1
-    rise = (sections.levels[last] - sections.levels[0]) / last
-    for i in range(begin, stop):
-        for k in range(inside.shape[2]):
-            x0, z0 = cells.first[0] + i * cells.spacing, cells.first[2] + k * cells.spacing
-            x = cells.cosine * x0 - cells.sine * z0
-            z = cells.cosine * z0 + cells.sine * x0
-            for j in range(inside.shape[1]):
-                height = cells.first[1] + j * cells.spacing - cells.roll * x
-                at = (height - sections.levels[0]) / rise
-                if at > last:
-                    break
-                at = min(max(at, 0.0), last - 1e-9)
-                low = int(at)
-                t = at - low
-                across = abs(x - _between(sections.left, low, t))
-                along = abs(z - _between(sections.ahead, low, t))
-                across /= _between(sections.breadth, low, t)
-                along /= _between(sections.depth, low, t)
-                if across < 1 and along < 1:
-                    # within the ellipse no powers are needed: the superellipse is larger
-                    near = across * across + along * along < 1
-                    inside[i, j, k] = near or across**EXPONENT + along**EXPONENT < 1
-
-
-@compiled
-def _between(values: Float64Array, low: int, t: float) -> float:
-    """Return the linear interpolation between `values[low]` and the next one."""
-    return float(values[low] + t * (values[low + 1] - values[low]))

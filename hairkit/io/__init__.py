@@ -23,6 +23,7 @@ every size before they ask for memory. Grooms and caches save and load themselve
 * `mesh_text`: triangle meshes of OBJ and PLY files
 * `number_text`: numbers in text files, fast
 * `photos`: photos, with their headers checked first
+* `plain_settings`: settings of a groom as numbers, texts and lists
 * `ply_elements`: elements of PLY files, and strands from them
 * `polylines`: strands from loose edges
 * `spline_curves`: points on spline curves from control points

@@ -9,7 +9,7 @@ import os
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+from scipy.spatial.transform import Rotation, Slerp
 
 from hairkit.arrays import Float64Array, Int64Array
 from hairkit.io.glb_file import GlbFile, node_matrix, readable
@@ -137,7 +137,10 @@ def _local(
 def _sample(
     keys: Float64Array, values: Float64Array, way: str, times: Float64Array, *, turning: bool
 ) -> Float64Array:
-    """Return (T, width) values at the times, those of the ends beyond the keys."""
+    """Return (T, width) values at the times, those of the ends beyond the keys.
+
+    Quaternions are of any length, but not 0.
+    """
     times = np.clip(times, keys[0], keys[-1])
     after = np.clip(np.searchsorted(keys, times, side="right"), 1, max(len(keys) - 1, 1))
     if len(keys) == 1:
@@ -146,15 +149,14 @@ def _sample(
     span = np.maximum(keys[after] - keys[before], 1e-9)
     share = np.clip((times - keys[before]) / span, 0, 1)[:, None]
     if way == "STEP":
-        chosen = np.where(share[:, 0] >= 1, after, before)
-        result = values[chosen]
-    elif way == "CUBICSPLINE":
-        result = _spline(values.reshape(len(keys), 3, -1), before, after, span[:, None], share)
-    elif turning:
-        return _slerp(values[before], values[after], share)
-    else:
-        result = values[before] * (1 - share) + values[after] * share
-    return _normalise(result) if turning else result
+        return values[np.where(share[:, 0] >= 1, after, before)]
+    if way == "CUBICSPLINE":
+        return _spline(values.reshape(len(keys), 3, -1), before, after, span[:, None], share)
+    if turning and len(keys) > 1:
+        turns: Float64Array = Slerp(keys, Rotation.from_quat(values))(times).as_quat()
+        return turns
+    result: Float64Array = values[before] * (1 - share) + values[after] * share
+    return result
 
 
 def _spline(
@@ -167,28 +169,6 @@ def _spline(
         + (3 * t**2 - 2 * t**3) * values[after, 1]
         + span * (t**3 - t**2) * values[after, 0]
     )
-    return result
-
-
-def _slerp(first: Float64Array, second: Float64Array, share: Float64Array) -> Float64Array:
-    """Return unit quaternions on the shorter arc between two."""
-    first, second = _normalise(first), _normalise(second)
-    cosine = (first * second).sum(axis=1, keepdims=True)
-    second = np.where(cosine < 0, -second, second)
-    angle = np.arccos(np.clip(np.abs(cosine), 0, 1))
-    sine = np.sin(angle)
-    near = sine < 1e-6
-    divisor = np.where(near, 1.0, sine)
-    low = np.where(near, 1 - share, np.sin((1 - share) * angle) / divisor)
-    high = np.where(near, share, np.sin(share * angle) / divisor)
-    return _normalise(low * first + high * second)
-
-
-def _normalise(quaternions: Float64Array) -> Float64Array:
-    length = np.linalg.norm(quaternions, axis=1, keepdims=True)
-    if (length < 1e-6).any():
-        raise ValueError("a rotation is a quaternion of length 0")
-    result: Float64Array = quaternions / length
     return result
 
 

@@ -1,16 +1,12 @@
-"""Strands put together from line segments: by order where a file keeps it, else by list ranking.
-
-List ranking by pointer jumping (Wyllie, The Complexity of Parallel Computations, 1979) over the
-two directions of every segment takes log2(longest strand) rounds over all strands at once.
-"""
+"""Strands put together from line segments: by order where a file keeps it, else as a graph."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components, dijkstra
 
-from hairkit.arrays import BoolArray, Int64Array
+from hairkit.arrays import Int64Array
 from hairkit.errors import FormatError
 
 
@@ -35,7 +31,9 @@ def join_segments(segments: Int64Array, vertices: int) -> tuple[Int64Array, Int6
     segments = segments[np.sort(first)]
     if not len(segments):
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
-    return _strands(_rank(_Halves.of(segments, vertices)))
+    vertex = np.concatenate([np.arange(vertices), segments.ravel()])
+    nodes, counts = _strands(_paths(segments, vertices), vertex)
+    return vertex[nodes], counts
 
 
 def chains(edges: Int64Array, vertices: int) -> tuple[Int64Array, Int64Array]:
@@ -58,39 +56,6 @@ def chains(edges: Int64Array, vertices: int) -> tuple[Int64Array, Int64Array]:
     return order[turn], counts[np.argsort(first)]
 
 
-@dataclass(frozen=True, eq=False)
-class _Halves:
-    """Both directions of every segment: half 2 e runs as segment e does, half 2 e + 1 back."""
-
-    start: Int64Array
-    end: Int64Array
-    following: Int64Array
-    """The half that goes on from each one's end; itself where the strand ends."""
-
-    @staticmethod
-    def of(segments: Int64Array, vertices: int) -> _Halves:
-        start, end = segments.ravel(), segments[:, ::-1].ravel()
-        number = np.arange(len(start))
-        degree = np.bincount(start, minlength=vertices)
-        # of the two halves that leave a vertex, one is the way back: the sum tells the other
-        leaving = np.bincount(start, number, minlength=vertices).astype(np.int64)
-        following = np.where(degree[end] == 2, leaving[end] - (number ^ 1), number)
-        return _Halves(start, end, following)
-
-
-@dataclass(frozen=True, eq=False)
-class _Ranked:
-    """Halves with their place in the strand."""
-
-    halves: _Halves
-    last: Int64Array
-    """The last half of each one's strand."""
-    left: Int64Array
-    """Halves that follow up to it."""
-    kept: BoolArray
-    """False for one direction of every ring."""
-
-
 def _consecutive(segments: Int64Array, vertices: int) -> tuple[Int64Array, Int64Array] | None:
     """Return the strands of segments that stand one after the other in the file, else None."""
     if not len(segments):
@@ -104,61 +69,44 @@ def _consecutive(segments: Int64Array, vertices: int) -> tuple[Int64Array, Int64
     return order, counts
 
 
-def _rank(halves: _Halves) -> _Ranked:
-    last, left = _jump_to_ends(halves.following)
-    open_ended = halves.following[last] == last
-    kept = np.ones(len(last), bool)
-    if not open_ended.all():
-        halves, kept = _cut_rings(halves, ~open_ended)
-        last, left = _jump_to_ends(halves.following)
-    return _Ranked(halves, last, left, kept)
+def _paths(segments: Int64Array, vertices: int) -> Int64Array:
+    """Return the segments (M, 2) between nodes that are joined to strands alone.
+
+    A node is a vertex, or has the number of an end of a segment above those of all vertices: where
+    strands end, each segment has a node of its own there, and so has the first one of a ring.
+    """
+    own = vertices + np.arange(segments.size).reshape(-1, 2)
+    nodes = np.where(
+        np.bincount(segments.ravel(), minlength=vertices)[segments] == 2, segments, own
+    )
+    strand = _strand_of(nodes)[nodes[:, 0]]
+    first = np.unique(strand, return_index=True)[1]
+    opened = np.bincount(strand, (nodes >= vertices).any(axis=1))[np.unique(strand)] > 0
+    nodes[first[~opened], 0] = own[first[~opened], 0]
+    return nodes
 
 
-def _jump_to_ends(following: Int64Array) -> tuple[Int64Array, Int64Array]:
-    """Return where each half's way ends and after how many steps; rings come to no end."""
-    last, left = following, (following != np.arange(len(following))).astype(np.int64)
-    for _ in range(len(following).bit_length()):
-        if (following[last] == last).all():
-            break
-        left = left + left[last]
-        last = last[last]
-    return last, left
+def _strand_of(nodes: Int64Array) -> Int64Array:
+    """Return the number of the strand of each node."""
+    count = int(nodes.max()) + 1
+    graph = coo_matrix((np.ones(len(nodes), np.int8), tuple(nodes.T)), (count, count))
+    strand: Int64Array = connected_components(graph, directed=False)[1]
+    return strand
 
 
-def _cut_rings(halves: _Halves, ring: BoolArray) -> tuple[_Halves, BoolArray]:
-    """Return halves whose rings end before their lowest half, and which direction to keep."""
-    lowest, jump = np.arange(len(ring)), halves.following
-    for _ in range(len(ring).bit_length()):
-        lowest = np.minimum(lowest, lowest[jump])
-        jump = jump[jump]
-    following = halves.following.copy()
-    before = np.flatnonzero(ring & (following == lowest))
-    following[before] = before
-    kept = ~ring | (lowest < lowest[np.arange(len(ring)) ^ 1])
-    return _Halves(halves.start, halves.end, following), kept
-
-
-def _strands(ranked: _Ranked) -> tuple[Int64Array, Int64Array]:
-    """Return vertices in order and counts, of the better direction of each strand."""
-    halves, last, left = ranked.halves, ranked.last, ranked.left
-    number = np.arange(len(last))
-    along = np.bincount(last, number % 2 == 0, minlength=len(last))
-    members = np.bincount(last, minlength=len(last))
-    is_first = left == members[last] - 1
-    first = np.zeros(len(last), np.int64)
-    first[last[is_first]] = number[is_first]
-    backward = first[last] ^ 1  # the last half of the same strand, run the other way
-    better = 2 * along[last] - members[last]
-    root, tip = halves.start[first[last]], halves.end[last]
-    take = (better > 0) | ((better == 0) & ((root < tip) | ((root == tip) & (last < backward))))
-    whole_ring = ~ranked.kept | ~ranked.kept[number ^ 1]
-    take = np.where(whole_ring, ranked.kept, take)
-    chosen = np.flatnonzero(take)
-    # strands in the order of their first segment in the file
-    earliest = np.full(len(last), len(last))
-    np.minimum.at(earliest, last[chosen], chosen // 2)
-    order = chosen[np.lexsort((-left[chosen], last[chosen], earliest[last[chosen]]))]
-    ends = np.append(last[order[1:]] != last[order[:-1]], True)
-    counts = np.diff(np.flatnonzero(ends), prepend=-1) + 1
-    begins = np.flatnonzero(np.append(True, ends[:-1]))
-    return np.insert(halves.end[order], begins, halves.start[order[begins]]), counts
+def _strands(nodes: Int64Array, vertex: Int64Array) -> tuple[Int64Array, Int64Array]:
+    """Return the nodes (P,) of all strands in order and their counts, by `vertex` (N,) of nodes."""
+    used, ends = np.unique(nodes, return_inverse=True)
+    ends, count = ends.reshape(-1, 2), len(used)
+    _, strand = np.unique(_strand_of(nodes)[used], return_inverse=True)
+    earliest = np.unique(strand[ends[:, 0]], return_index=True)[1]
+    # steps from the end whose vertex comes first, all strands at once from a node beyond
+    outer = np.flatnonzero(np.bincount(ends.ravel()) == 1)
+    outer = outer[np.lexsort((vertex[used[outer]], strand[outer]))][::2]
+    pairs = np.concatenate([ends, np.stack([outer, np.full(len(outer), count)], axis=1)])
+    graph = coo_matrix((np.ones(len(pairs)), tuple(pairs.T)), (count + 1, count + 1))
+    steps = dijkstra(graph, directed=False, indices=count, unweighted=True)[:count]
+    along = np.sign(steps[ends[:, 1]] - steps[ends[:, 0]])
+    backwards = np.bincount(strand[ends[:, 0]], along) < 0
+    order = np.lexsort((np.where(backwards[strand], -steps, steps), earliest[strand]))
+    return used[order], np.bincount(strand)[np.argsort(earliest)]

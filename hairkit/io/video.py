@@ -8,7 +8,6 @@ turn ran, is found later, by the stage `turn`.
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +17,10 @@ import numpy.typing as npt
 from scipy.ndimage import median_filter
 
 from hairkit.arrays import Float64Array, Int64Array
-from hairkit.child_process import ChildError, Limits, ask_once
+from hairkit.child_process import ChildError, Limits, ask_for_arrays
 from hairkit.errors import FormatError, InputError
 from hairkit.io import video_child
-from hairkit.storage import open_file, read_npz
+from hairkit.storage import open_file
 from hairkit.types.capture import Capture, View
 
 SUFFIXES = (".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm")
@@ -147,15 +146,13 @@ def choose_frames(
 
 def _decode(mode: str, path: Path, **values: Any) -> dict[str, npt.NDArray[Any]]:
     """Return the arrays that the process for decoding writes; `FormatError` when it fails."""
-    with tempfile.TemporaryDirectory(prefix="hairkit-video-") as folder:
-        out = Path(folder) / "frames.npz"
-        question = {"do": mode, "video": str(path.resolve()), "out": str(out), **values}
-        try:
-            answer = ask_once(Path(video_child.__file__), question, Limits(TIME_LIMIT_S))
-        except ChildError as error:
-            if error.limit:
-                raise InputError(f"{path}: its decoder {error}; cut it") from error
-            raise FormatError(f"{path}: not a readable video: its decoder {error}") from error
-        if "refused" in answer:
-            raise FormatError(f"{path}: not a readable video: {answer['refused']}")
-        return read_npz(out)
+    question = {"do": mode, "video": str(path.resolve()), **values}
+    try:
+        answer, arrays = ask_for_arrays(Path(video_child.__file__), question, Limits(TIME_LIMIT_S))
+    except ChildError as error:
+        if error.limit:
+            raise InputError(f"{path}: its decoder {error}; cut it") from error
+        raise FormatError(f"{path}: not a readable video: its decoder {error}") from error
+    if "refused" in answer:
+        raise FormatError(f"{path}: not a readable video: {answer['refused']}")
+    return arrays

@@ -1,6 +1,6 @@
 """The process that decodes a video: a damaged file may crash a decoder, and must not end a run.
 
-Asked for a `video`, it writes the arrays `out`, an .npz file, or answers why it is `refused`.
+Asked for a `video`, it writes the arrays to `target`, an .npz file, or answers why it is `refused`.
 
 * `scan`: small grey frames of a `width`, `most` to twice as many, their numbers and sharpness
 * `pick`: the frames with these `numbers`, scaled down to the `edge`
@@ -87,7 +87,7 @@ def _write(asked: dict[str, Any], find: Callable[..., dict[str, Any]], *rest: An
     if not video.isOpened():
         return {"refused": "OpenCV cannot open it"}
     arrays: dict[str, Any] = {k: np.asarray(v) for k, v in find(video, *rest).items()}
-    np.savez(asked["out"], **arrays)
+    np.savez(asked["target"], **arrays)
     return {}
 
 

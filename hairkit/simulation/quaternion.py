@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial.transform import Rotation
 
 from hairkit.arrays import Float64Array
 
@@ -80,45 +81,18 @@ def from_axis(axis: npt.ArrayLike, angle: npt.ArrayLike) -> Float64Array:
 
 def from_matrix(matrix: npt.ArrayLike) -> Float64Array:
     """Return the quaternions (..., 4) of rotation matrices (..., 3, 3), with w >= 0."""
-    m = np.asarray(matrix, np.float64)
-    if (
-        m.ndim == 2 and m[0, 0] + m[1, 1] + m[2, 2] > 0
-    ):  # a single rotation of less than 120 degrees
-        w = 0.5 * float(np.sqrt(1.0 + m[0, 0] + m[1, 1] + m[2, 2]))
-        x, y, z = m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]
-        return np.array([w, x / (4 * w), y / (4 * w), z / (4 * w)])
-    xx, yy, zz = m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]
-    # Four candidates, each exact where its own component is the largest (Shepperd 1978).
-    squares = np.stack([xx + yy + zz, xx - yy - zz, yy - xx - zz, zz - xx - yy], axis=-1) + 1.0
-    a, b, c = (
-        m[..., 2, 1] - m[..., 1, 2],
-        m[..., 0, 2] - m[..., 2, 0],
-        m[..., 1, 0] - m[..., 0, 1],
-    )
-    d, e, f = (
-        m[..., 1, 0] + m[..., 0, 1],
-        m[..., 2, 0] + m[..., 0, 2],
-        m[..., 2, 1] + m[..., 1, 2],
-    )
-    rows = np.stack(
-        [
-            np.stack([squares[..., 0], a, b, c], axis=-1),
-            np.stack([a, squares[..., 1], d, e], axis=-1),
-            np.stack([b, d, squares[..., 2], f], axis=-1),
-            np.stack([c, e, f, squares[..., 3]], axis=-1),
-        ],
-        axis=-2,
-    )
-    best = np.argmax(squares, axis=-1)
-    q = normalize(np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :])
-    return np.where(q[..., :1] < 0, -q, q)
+    given = np.asarray(matrix, np.float64)
+    found = Rotation.from_matrix(given.reshape(-1, 3, 3)).as_quat(canonical=True)
+    q: Float64Array = np.roll(found, 1, axis=-1).reshape(*given.shape[:-2], 4)
+    return q
 
 
 def to_matrix(q: npt.ArrayLike) -> Float64Array:
     """Return the rotation matrices (..., 3, 3) of unit quaternions."""
-    quaternion = np.asarray(q, np.float64)
-    axes = np.eye(3)
-    return np.stack([rotate(quaternion, axes[k]) for k in range(3)], axis=-1)
+    given = np.asarray(q, np.float64)
+    turns = Rotation.from_quat(np.roll(given, -1, axis=-1).reshape(-1, 4))
+    matrix: Float64Array = turns.as_matrix().reshape(*given.shape[:-1], 3, 3)
+    return matrix
 
 
 def slerp(start: Float64Array, end: Float64Array, share: float) -> Float64Array:

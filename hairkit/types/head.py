@@ -81,7 +81,9 @@ class Head(Previewed, Stored):
         density = freeze(self, "density", np.float32, (len(vertices),), "head density")
         if density is not None and (density.min() < 0 or density.max() > 1):
             raise DataError("head density lies outside [0, 1]")
-        freeze(self, "landmark_vertices", np.int32, (LANDMARKS,), "head landmark_vertices")
+        marks = freeze(self, "landmark_vertices", np.int32, (LANDMARKS,), "head landmark_vertices")
+        if marks is not None and (marks.min() < 0 or marks.max() >= len(vertices)):
+            raise DataError("head landmark_vertices name vertices that do not exist")
         self._check_shapes()
 
     def _check_shapes(self) -> None:

@@ -4,17 +4,16 @@ All strands are one curves object, in the groom's order, and say strand by stran
 guides: Blender then makes one hair object, Unity merges nothing, and Unreal reads `groom_guide` of
 every curve. There is no mesh in the file, because Unreal refuses grooms with one; the head goes
 into an FBX file.
-Written through the Alembic library (alembic3d), whose arrays are filled from NumPy's memory. Read
-by the plugin itself, because that library's reader ends the process at some damaged files.
+Written and read through the Alembic library (alembic3d), whose arrays share NumPy's memory; read in
+a process of its own, because the library ends the process at some damaged files.
 Sources: Alembic 1.8 AbcGeom and Ogawa; Epic's "Alembic for Grooms Specification", version 1.5.
 
-* `archive`: objects and properties of an archive
+* `contents`: the objects of a file
 * `curve_sets`: curves objects of a file: world points, widths, attributes
 * `curves`: a groom's curves in the file's space, within Unreal's limits
-* `ogawa`: the Ogawa container: groups and data blocks
 * `options`: settings
+* `reading_child`: the program that reads files
 * `to_groom`: a groom from curves of a file
-* `transforms`: transforms of objects
 * `validation`: rules of Unreal's groom schema
 * `writer`: writing through the Alembic library
 """

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,43 +12,19 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
 from hairkit.errors import FormatError
+from hairkit.grooming.curve_sets import CONSTANT, UNIFORM, VERTEX, CurveSet, Spread, on_curve
 from hairkit.io.spline_curves import cubic_map, nurbs_map
 
-from .archive import Archive, Object, Property, tag
-from .transforms import compose_transform
+from .contents import Object, Values, read_objects
 
 _CUBIC, _LINEAR, _NON_PERIODIC = 0, 1, 0
 _CUBIC_ORDER = 4
 _BASES = {1: "bezier", 2: "bspline", 3: "catmullRom"}
 """Alembic's numbers of bases (`AbcGeom::BasisType`)."""
-_MOST_LEVELS = 100
+_SCOPES = {"con": CONSTANT, "uni": UNIFORM, "vtx": VERTEX}
 _IDENTITY = np.eye(4)
 
 _log = logging.getLogger("hairkit")
-
-
-@dataclass(frozen=True, eq=False)
-class CurveSet:
-    """One curves object at its first frame; None where the file says nothing."""
-
-    points: Float32Array
-    """(P, 3) in the world, in the file's axes and unit."""
-    counts: Int64Array
-    """(S,) points of each curve."""
-    widths: Float32Array | None
-    """(P,) diameters in the file's unit."""
-    root_uv: Float32Array | None
-    """(S, 2)."""
-    colour: Float32Array | None
-    """(P, 3)."""
-    group: Int64Array | None
-    """(S,)."""
-    guide: Int64Array | None
-    """(S,)."""
-    frames: int
-    """Samples of the points in time."""
-    plain: bool
-    """False where the points stay control points: of closed curves, or of rare bases."""
 
 
 def read_curve_sets(path: Path) -> list[CurveSet]:
@@ -62,106 +37,86 @@ def read_curve_sets(path: Path) -> list[CurveSet]:
     InputError
         The file is missing, or of the HDF5 kind.
     """
-    archive = Archive.open(path)
-    sets = [
-        found
-        for node, world in _walk(archive)
-        if node.is_a("AbcGeom_Curve") and (found := _curve_set(node, world)) is not None
-    ]
+    curves = (each for each in read_objects(path) if each.is_a("AbcGeom_Curve"))
+    sets = [found for each in curves if (found := _curve_set(each)) is not None]
     if not sets:
         raise FormatError(f"{path}: an Alembic file without curves")
     return sets
 
 
-def _walk(archive: Archive) -> Iterator[tuple[Object, Float64Array]]:
-    """Yield every object and its transform to the world, parents first, in the file's order."""
-    waiting: list[tuple[Object, Float64Array, int]] = [(archive.top(), _IDENTITY, 0)]
-    while waiting:
-        node, above, level = waiting.pop()
-        if level > _MOST_LEVELS:
-            raise archive.file.error(f"objects lie more than {_MOST_LEVELS} levels deep")
-        world = compose_transform(above, node)
-        yield node, world
-        below = [(child, world, level + 1) for child in node.objects()]
-        waiting += below[::-1]
-
-
-def _curve_set(node: Object, world: Float64Array) -> CurveSet | None:
-    geometry = node.properties().get(".geom")
-    found = geometry.properties() if geometry else {}
-    points = found["P"].float32() if "P" in found else None
+def _curve_set(node: Object) -> CurveSet | None:
+    found, world = node.values, node.world
+    points = found["P"].floats() if "P" in found else None
     if points is None:
         return None
     counts = _counts(found, points, node)
-    values = _Values(node, counts)
-    spline, plain = _spline(found, counts, node)
-    attributes = found[".arbGeomParams"].properties() if ".arbGeomParams" in found else {}
-    widths = values.per_point(attributes.get("groom_width"), 1)
-    if widths is None:
-        widths = values.per_point(found.get("width"), 1)
-    uv = values.per_strand(attributes.get("groom_root_uv"), 2, "f")
-    if uv is None:
-        uv = values.per_strand(found.get("uv"), 2, "f")
-    group = values.per_strand(attributes.get("groom_group_id"), 1, "i")
-    guide = values.per_strand(attributes.get("groom_guide"), 1, "i")
+    spread = Spread(counts)
+
+    def at_points(*names: str, columns: int) -> Any:
+        values = _values(node, names, columns, "f")
+        return values and _fit(spread.to_points(*values), node, names)
+
+    def at_strands(*names: str, columns: int, kind: str) -> Any:
+        values = _values(node, names, columns, kind)
+        return values and _fit(spread.to_strands(*values), node, names)
+
+    if found["P"].samples > 1:
+        frames = found["P"].samples
+        _log.warning("%s: animated, %d frames; the first is read", node.path, frames)
+    spline = _spline(found, counts, node)
+    widths = on_curve(spline, at_points("groom_width", "width", columns=1))
+    group = at_strands("groom_group_id", columns=1, kind="i")
+    guide = at_strands("groom_guide", columns=1, kind="i")
     return CurveSet(
-        points=_move(_on_curve(spline, points), world),
+        points=_move(on_curve(spline, points), world),
         counts=counts,
-        widths=None if widths is None else _scale(_on_curve(spline, widths)[:, 0], world),
-        root_uv=uv,
-        colour=_on_curve(spline, values.per_point(attributes.get("groom_color"), 3)),
+        widths=None if widths is None else _scale(widths[:, 0], world),
+        root_uv=at_strands("groom_root_uv", "uv", columns=2, kind="f"),
+        colour=on_curve(spline, at_points("groom_color", columns=3)),
         group=None if group is None else group[:, 0],
         guide=None if guide is None else guide[:, 0],
-        frames=found["P"].samples,
-        plain=plain,
     )
 
 
-def _counts(found: dict[str, Property], points: Float32Array, node: Object) -> Int64Array:
+def _counts(found: Mapping[str, Values], points: Float32Array, node: Object) -> Int64Array:
     counts = found["nVertices"].integers() if "nVertices" in found else None
     if points.shape[1] != 3 or counts is None or counts.min() < 0:
-        raise node.archive.file.error(f"{node.name} has no points or counts of points")
+        raise node.error("has no points or counts of points")
     # each count is at most the number of points, so that their sum cannot overflow
     if counts.max() > len(points) or counts.sum() != len(points):
-        raise node.archive.file.error(
-            f"{node.name} has {len(points)} points, its curves ask for another number"
-        )
+        raise node.error(f"has {len(points)} points, its curves ask for another number")
     return counts[:, 0]
 
 
-def _spline(
-    found: Mapping[str, Property], counts: Int64Array, node: Object
-) -> tuple[Any | None, bool]:
-    """Return the map (P, P) from control points to points on the curves, and whether all is told.
+def _spline(found: Mapping[str, Values], counts: Int64Array, node: Object) -> Any | None:
+    """Return the map (P, P) from control points to points on the curves.
 
-    None for polylines, and for Catmull-Rom curves, which run through their control points.
+    None for polylines, for Catmull-Rom curves, which run through their control points, and for
+    closed ones and rare bases, whose control points are taken.
     """
     header = found.get("curveBasisAndType")
     numbers = None if header is None else header.integers()
     if numbers is None or numbers.size < 3:
-        return None, True
+        return None
     kind, wrap, basis = (int(number) for number in numbers.ravel()[:3])
-    if wrap != _NON_PERIODIC:
-        return None, False
     knots = found[".knots"].floats() if ".knots" in found else None
-    if kind != _LINEAR and knots is not None and len(knots):
+    if wrap == _NON_PERIODIC and kind != _LINEAR and knots is not None and len(knots):
         orders = found[".orders"].integers() if ".orders" in found else None
         order = np.full(len(counts), _CUBIC_ORDER) if orders is None else orders.ravel()
         weights = found["w"].floats() if "w" in found else None
         if len(order) != len(counts) or (weights is not None and len(weights) != counts.sum()):
-            raise node.archive.file.error(f"{node.name} has orders or weights of other curves")
-        rational = None if weights is None else weights.ravel()
-        return nurbs_map(counts, order, knots.ravel(), rational, node.name), True
-    if kind == _LINEAR or _BASES.get(basis) == "catmullRom":
-        return None, True
-    if kind != _CUBIC or basis not in _BASES:
-        return None, False
-    return cubic_map(counts, _BASES[basis]), True
-
-
-def _on_curve(spline: Any | None, values: Float32Array | None) -> Any:
-    """Return values (P, C) of control points at the points on the curves."""
-    return values if spline is None or values is None else (spline @ values).astype(np.float32)
+            raise node.error("has orders or weights of other curves")
+        rational = None if weights is None else weights.ravel().astype(np.float64)
+        places = knots.ravel().astype(np.float64)
+        return nurbs_map(counts, order, places, rational, node.name)
+    if wrap == _NON_PERIODIC and (kind == _LINEAR or _BASES.get(basis) == "catmullRom"):
+        return None
+    if wrap == _NON_PERIODIC and kind == _CUBIC and basis in _BASES:
+        return cubic_map(counts, _BASES[basis])
+    _log.warning(
+        "%s: closed or Hermite curves; their control points are taken as open polylines", node.path
+    )
+    return None
 
 
 def _move(points: Float32Array, world: Float64Array) -> Float32Array:
@@ -182,61 +137,24 @@ def _scale(widths: Float32Array, world: Float64Array) -> Float32Array:
     return scaled
 
 
-class _Values:
-    """Values of geometry parameters, spread to points or strands by their scope."""
+def _values(
+    node: Object, names: tuple[str, ...], columns: int, kind: str
+) -> tuple[npt.NDArray[Any], str] | None:
+    """Return (N, columns) of the first of the names that there are, and the scope that is said."""
+    for name in names:
+        found = node.values.get(name)
+        values: npt.NDArray[Any] | None = None
+        if found is not None:
+            values = found.integers() if kind == "i" else found.floats()
+        if found is not None and values is not None and values.shape[1] == columns:
+            return values, _SCOPES.get(found.scope, "")
+        if found is not None and found.samples:
+            _log.warning("%s of %s is of another type; left out", name, node.name)
+    return None
 
-    def __init__(self, node: Object, counts: Int64Array) -> None:
-        self.node, self.counts = node, counts
 
-    def per_point(self, header: Property | None, extent: int) -> Any:
-        """Return (P, extent) float32 or None."""
-        values = self._values(header, extent, "f")
-        if values is None:
-            return None
-        scope = self._scope(header, len(values))
-        if scope == "con":
-            return np.repeat(values[:1], self.counts.sum(), axis=0)
-        return np.repeat(values, self.counts, axis=0) if scope == "uni" else values
-
-    def per_strand(self, header: Property | None, extent: int, kind: str) -> Any:
-        """Return (S, extent) float32 or int64, of values at points the root's, or None."""
-        values = self._values(header, extent, kind)
-        if values is None:
-            return None
-        scope = self._scope(header, len(values))
-        if scope == "con":
-            return np.repeat(values[:1], len(self.counts), axis=0)
-        if scope == "uni":
-            return values
-        roots = np.minimum(np.cumsum(self.counts) - self.counts, len(values) - 1)
-        return values[roots]
-
-    def _values(self, header: Property | None, extent: int, kind: str) -> npt.NDArray[Any] | None:
-        """Return (N, extent) the values, of an indexed parameter those that it names."""
-        if header is None:
-            return None
-        parts = header.properties()
-        header = parts.get(".vals", header)
-        values: npt.NDArray[Any] | None = header.integers() if kind == "i" else header.float32()
-        index = parts[".indices"].integers() if ".indices" in parts else None
-        if values is not None and index is not None:
-            if index.min() < 0 or index.max() >= len(values):
-                raise self.node.archive.file.error(f"{header.name} has bad indices")
-            values = values[index[:, 0]]
-        if values is None or values.shape[1] != extent:
-            if header.samples:
-                _log.warning("%s of %s is of another type; left out", header.name, self.node.name)
-            return None
-        return values
-
-    def _scope(self, header: Property | None, have: int) -> str:
-        """Return the scope by the number of values, which the metadata only breaks ties of."""
-        sizes = {"con": 1, "uni": len(self.counts), "vtx": int(self.counts.sum())}
-        fitting = [scope for scope, size in sizes.items() if size == have]
-        said = "" if header is None else tag(header.metadata, "geoScope")
-        if not fitting:
-            raise self.node.archive.file.error(
-                f"{self.node.name} has {have} values of {header.name if header else ''} for"
-                f" {sizes['uni']} curves of {sizes['vtx']} points"
-            )
-        return said if said in fitting else fitting[-1]
+def _fit(values: npt.NDArray[Any] | None, node: Object, names: tuple[str, ...]) -> Any:
+    """Return values; raises `FormatError` where their number fits neither curves nor points."""
+    if values is None:
+        raise node.error(f"has values of {names[0]} for other curves or points")
+    return values

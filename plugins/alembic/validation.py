@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,50 +10,27 @@ import numpy as np
 
 from hairkit.types.finding import Finding
 
-from .archive import Archive, Object
+from .contents import Object, Values, read_objects
 
 TARGETS = ("unreal", "metahuman")
-_MOST_OBJECTS = 100_000
 
 
 def check_schema(path: Path) -> list[Finding]:
     """Return findings about groom_version, ids, groups, guides' weights and meshes of a file."""
-    nodes = list(_nodes(Archive.open(path)))
+    nodes = read_objects(path)
     meshes = [node.name for node in nodes if node.is_a("AbcGeom_PolyMesh")]
     said = f"meshes in the file: {', '.join(meshes[:3]) or 'none'}; Unreal refuses grooms with one"
     found = [Finding.of("no-mesh", not meshes, said)]
-    versions = [node for node in nodes if "groom_version_major" in _user_properties(node)]
+    versions = [node for node in nodes if "groom_version_major" in node.user]
     said = "groom_version_major stands on a transform" if versions else "no groom_version_major"
     found.append(Finding.of("groom-version", bool(versions), said, otherwise="warning"))
     for node in nodes:
         if node.is_a("AbcGeom_Curve"):
-            found += _curves(node, _attributes(node))
+            found += _curves(node, node.values)
     return found
 
 
-def _nodes(archive: Archive) -> Iterator[Object]:
-    waiting = [archive.top()]
-    for _ in range(_MOST_OBJECTS):
-        if not waiting:
-            return
-        node = waiting.pop()
-        yield node
-        waiting += node.objects()
-
-
-def _user_properties(node: Object) -> dict[str, Any]:
-    schema = node.properties().get(".xform")
-    user = {} if schema is None else schema.properties()
-    return user[".userProperties"].properties() if ".userProperties" in user else {}
-
-
-def _attributes(node: Object) -> dict[str, Any]:
-    geometry = node.properties().get(".geom")
-    found = geometry.properties() if geometry else {}
-    return found[".arbGeomParams"].properties() if ".arbGeomParams" in found else {}
-
-
-def _curves(node: Object, attributes: dict[str, Any]) -> list[Finding]:
+def _curves(node: Object, attributes: Mapping[str, Values]) -> list[Finding]:
     found = []
     if "groom_id" in attributes:
         ids = _numbers(attributes["groom_id"])
@@ -74,7 +51,6 @@ def _curves(node: Object, attributes: dict[str, Any]) -> list[Finding]:
     return found
 
 
-def _numbers(header: Any) -> Any:
-    header = header.properties().get(".vals", header)
-    whole = header.integers()
-    return header.floats() if whole is None else whole
+def _numbers(values: Values) -> Any:
+    whole = values.integers()
+    return values.floats() if whole is None else whole

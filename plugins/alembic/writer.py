@@ -18,11 +18,13 @@ from hairkit.storage import replace_file
 from hairkit.system import utf8_name
 from hairkit.version import __version__
 
+from .contents import FINISHED, MAGIC
 from .curves import GroomCurves
-from .ogawa import is_complete
 
 GROOM_VERSION = (1, 5)
 """Major and minor version of Unreal's groom schema."""
+_OGAWA_BYTES = 16
+"""Of the header of the file: magic number, version, place of the root group."""
 _HEADER_BYTES, _ATTRIBUTES = 512, 32
 """More than the header of a property or frame takes, and more than there are properties."""
 _UNIFORM, _VERTEX = AbcGeom.GeometryScope.kUniformScope, AbcGeom.GeometryScope.kVertexScope
@@ -49,7 +51,7 @@ def write_curves(curves: GroomCurves, path: Path) -> None:
             # the library closes its file when the last of its objects goes, which frames hold
             traceback.clear_frames(error.__traceback__)
             raise
-        if not is_complete(part):
+        if not _is_complete(part):
             raise InputError(f"{path}: the Alembic library did not write the whole file")
 
 
@@ -60,6 +62,18 @@ def _make_room(part: Path, size: int) -> None:
             os.posix_fallocate(file.fileno(), 0, size)
     if shutil.disk_usage(part.parent).free < size - part.stat().st_size:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def _is_complete(path: Path) -> bool:
+    """Return whether a file was closed and ends where its root group does, as Ogawa files do."""
+    with path.open("rb") as file:
+        head = file.read(_OGAWA_BYTES)
+        if len(head) < _OGAWA_BYTES or head[:6] != MAGIC + bytes([FINISHED]):
+            return False
+        root = int.from_bytes(head[8:], "little")
+        file.seek(root)
+        children = int.from_bytes(file.read(8), "little")
+        return path.stat().st_size == root + 8 + 8 * children
 
 
 def _size(curves: GroomCurves) -> int:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array
+from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array, unit_vectors
 from hairkit.types.strands import Strands
 
 SPREAD = 2.2
@@ -75,9 +75,9 @@ def make_cards(strands: Strands, lock: Int64Array, stations: int, middle: Float6
     points = _extended(strands.select(some), shaping, first, stations)
     count = np.diff([*first, len(some)])
     centre = np.add.reduceat(points, first) / count[:, None, None]
-    along = _unit(np.gradient(centre, axis=1))
+    along = unit_vectors(np.gradient(centre, axis=1))
     outwards = centre - middle
-    away = _unit(outwards - (outwards * along).sum(axis=-1, keepdims=True) * along)
+    away = unit_vectors(outwards - (outwards * along).sum(axis=-1, keepdims=True) * along)
     offset = points - np.repeat(centre, count, axis=0)
     flat = np.cross(along, away)
     # the scatter of the strands in the plane across the card, as a symmetric 2 x 2 matrix
@@ -130,10 +130,3 @@ def _smoothed(values: Float64Array) -> Float64Array:
     padded = np.pad(values, ((0, 0), (1, 1)), mode="edge")
     before, here, after = SMOOTHING
     return before * padded[:, :-2] + here * values + after * padded[:, 2:]
-
-
-def _unit(vectors: Float64Array) -> Float64Array:
-    unit: Float64Array = vectors / np.maximum(
-        np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-12
-    )
-    return unit

@@ -9,20 +9,21 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.arrays import Float32Array, Float64Array, Int64Array
+from hairkit.arrays import Float64Array, Int64Array
 from hairkit.errors import FormatError
-from hairkit.grooming.adopt_strands import ImportOptions, adopt, pack_strands
+from hairkit.grooming.adopt_strands import ImportOptions, adopt
+from hairkit.grooming.curve_sets import CurveSet, join_sets, strands_of
 from hairkit.head_model.scalp import bind
 from hairkit.io.glb_file import GlbFile, readable
 from hairkit.io.glb_skin import material_maps, shape_offsets
+from hairkit.io.plain_settings import capsules_of, made, ties_of
 from hairkit.io.polylines import join_segments
 from hairkit.io.textures import as_maps
-from hairkit.types.groom import Groom
+from hairkit.types.groom import Groom, HairMaterial, HairPhysics
 from hairkit.types.head import Head
 from hairkit.types.skin import Blendshape
-from hairkit.types.strands import Strands
 
-from .extras import VERSION, capsules_of, material_of, physics_of, ties_of, with_landmarks
+from .extras import VERSION, with_extras
 from .meshes import JOINTS
 from .options import Options
 
@@ -32,18 +33,6 @@ _LEAST_BYTES = 4
 """Of a file for each point that is made of it: positions alone take twelve."""
 _FARTHEST = 1e5
 """Positions of a head and its hair, in any unit; beyond, 32-bit floats have no millimetres."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Part:
-    """The strands of one primitive, points in order."""
-
-    points: Float32Array
-    counts: Int64Array
-    radius: Float32Array | None
-    root_uv: Float32Array | None
-    group: Int64Array | None
-    guide: npt.NDArray[np.bool_] | None
 
 
 def read_gltf_groom(path: str | os.PathLike[str], options: Options) -> Groom:
@@ -68,10 +57,10 @@ def read_gltf_groom(path: str | os.PathLike[str], options: Options) -> Groom:
                 f"{path}: holds no lines; ribbons and cards cannot be turned back into strands:"
                 " export the hair as lines or curves"
             )
-        strands = _strands(parts, path)
+        strands, _ = strands_of(join_sets(parts), path)
         head = _own_head(file, own) if own else None
-        material = material_of(own) if own else None
-        physics = physics_of(own) if own else None
+        material = made(HairMaterial, own["material"]) if own else None
+        physics = made(HairPhysics, own["physics"]) if own else None
         ties = ties_of(own) if own else ()
     if head is not None and options.head is None and material is not None:
         triangle, barycentric = bind(strands.roots, head)
@@ -91,8 +80,8 @@ def _own_extras(file: GlbFile) -> dict[str, Any] | None:
     return own
 
 
-def _parts(file: GlbFile, metres: float) -> list[_Part]:
-    parts: list[_Part] = []
+def _parts(file: GlbFile, metres: float) -> list[CurveSet]:
+    parts: list[CurveSet] = []
     read = 0
     for node, placed in file.nodes_in_place():
         if "mesh" not in node:
@@ -110,7 +99,9 @@ def _parts(file: GlbFile, metres: float) -> list[_Part]:
     return parts
 
 
-def _part(file: GlbFile, primitive: dict[str, Any], matrix: Float64Array, metres: float) -> _Part:
+def _part(
+    file: GlbFile, primitive: dict[str, Any], matrix: Float64Array, metres: float
+) -> CurveSet:
     attributes = primitive["attributes"]
     points = file.accessor(attributes["POSITION"])
     if points.shape[1] != 3 or points.dtype != np.float32:
@@ -131,14 +122,16 @@ def _part(file: GlbFile, primitive: dict[str, Any], matrix: Float64Array, metres
     if u is not None and v is not None:
         # glTF counts v from the top of the picture, this project upwards
         uv = np.stack([u, 1 - v], axis=1)[custom.first]
-    guide = custom.of_strands("guide")
-    return _Part(
+    if radius is not None and (radius < 0).any():
+        raise ValueError("a radius is below 0")
+    return CurveSet(
         points[order].astype(np.float32),
         counts,
-        None if radius is None else radius.astype(np.float32),
+        None if radius is None else (2 * radius).astype(np.float32),
         None if uv is None else uv.astype(np.float32),
+        None,
         custom.of_strands("group"),
-        None if guide is None else guide > 0,
+        custom.of_strands("guide"),
     )
 
 
@@ -221,28 +214,6 @@ def _weld(segments: Int64Array, points: npt.NDArray[Any]) -> Int64Array:
     return segments
 
 
-def _strands(parts: list[_Part], path: object) -> Strands:
-    """Return all parts' strands; what only some parts have is left out."""
-    points = np.concatenate([part.points for part in parts])
-    counts = np.concatenate([part.counts for part in parts])
-    strands, kept = pack_strands(points, counts, path)
-    radius, uv, group, guide = (
-        None if any(values is None for values in column) else np.concatenate(column)
-        for column in zip(
-            *((part.radius, part.root_uv, part.group, part.guide) for part in parts), strict=True
-        )
-    )
-    if radius is not None and (radius < 0).any():
-        raise ValueError("a radius is below 0")
-    return replace(
-        strands,
-        widths=None if radius is None else 2 * radius[np.repeat(counts >= 2, counts)],
-        root_uv=None if uv is None else uv[kept],
-        group=None if group is None else group[kept],
-        guide=None if guide is None else guide[kept],
-    )
-
-
 def _own_head(file: GlbFile, own: dict[str, Any]) -> Head | None:
     """Return the head of a file of hairkit's, or None where it was left out."""
     joints = np.zeros((3, 3))
@@ -282,4 +253,4 @@ def _own_head(file: GlbFile, own: dict[str, Any]) -> Head | None:
             ).items()
         ),
     )
-    return with_landmarks(head, own)
+    return with_extras(head, own)

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
-from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array
+from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array, unit_vectors
 from hairkit.errors import InputError
 from hairkit.types.head import Head
 from hairkit.types.strands import Strands
@@ -117,7 +117,7 @@ def outward(lines: Float32Array, head: Head) -> Float32Array:
     some = np.unique(np.append(np.arange(0, count, _EVERY), count - 1))
     found = _normals_near(lines[:, some], head)
     share = np.stack([np.interp(np.arange(count), some, row) for row in np.eye(len(some))], axis=1)
-    return _unit(share @ found.astype(np.float64)).astype(np.float32)
+    return unit_vectors(share @ found.astype(np.float64)).astype(np.float32)
 
 
 def _normals_near(points: Float32Array, head: Head) -> Float32Array:
@@ -129,7 +129,7 @@ def _normals_near(points: Float32Array, head: Head) -> Float32Array:
     near, distance = near.reshape(len(distance), -1), distance.reshape(len(distance), -1)
     weight = 1.0 / (distance + 1e-3)
     normals = (head.normals()[sample][near] * weight[..., None]).sum(axis=1)
-    return _unit(normals).astype(np.float32).reshape(points.shape)
+    return unit_vectors(normals).astype(np.float32).reshape(points.shape)
 
 
 def make_ribbons(lines: Float32Array, out: Float32Array, width: Float32Array) -> Ribbons:
@@ -157,10 +157,10 @@ def make_ribbons(lines: Float32Array, out: Float32Array, width: Float32Array) ->
 
 def frames(lines: Float32Array, out: Float32Array) -> tuple[Float32Array, Float32Array]:
     """Return unit directions along and across (N, K, 3) of lines, perpendicular to each other."""
-    along = _unit(np.gradient(lines.astype(np.float64), axis=1))
+    along = unit_vectors(np.gradient(lines.astype(np.float64), axis=1))
     still = ~along.any(axis=-1, keepdims=True)
     whole = lines[:, -1:].astype(np.float64) - lines[:, :1]
-    along = _unit(along + still * (whole + np.array([0.0, -1e-9, 0.0])))
+    along = unit_vectors(along + still * (whole + np.array([0.0, -1e-9, 0.0])))
     across = np.cross(out, along)
     turned = (across[:, 1:] * across[:, :-1]).sum(axis=-1) < 0
     sign = np.ones(across.shape[:2])
@@ -171,12 +171,12 @@ def frames(lines: Float32Array, out: Float32Array) -> tuple[Float32Array, Float3
     for _ in range(_SMOOTHINGS):
         padded = np.concatenate([across[:, :1], across, across[:, -1:]], axis=1)
         across = 0.25 * padded[:, :-2] + 0.5 * padded[:, 1:-1] + 0.25 * padded[:, 2:]
-    across += _MEAN_ACROSS * _unit(across.sum(axis=1, keepdims=True)) + (
+    across += _MEAN_ACROSS * unit_vectors(across.sum(axis=1, keepdims=True)) + (
         _ANY_ACROSS * _any_across(along[:, :1])
     )
     across -= along * (across * along).sum(axis=-1, keepdims=True)
     lost = np.linalg.norm(across, axis=-1, keepdims=True) < 1e-9
-    across = _unit(np.where(lost, _any_across(along), across))
+    across = unit_vectors(np.where(lost, _any_across(along), across))
     return along.astype(np.float32), across.astype(np.float32)
 
 
@@ -234,12 +234,7 @@ def _spread(
 def _any_across(along: Float64Array) -> Float64Array:
     """Return unit vectors perpendicular to `along`."""
     axis = np.eye(3)[np.abs(along).argmin(axis=-1)]
-    return _unit(np.cross(axis, along))
-
-
-def _unit(vectors: Float64Array) -> Float64Array:
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.where(length > 1e-12, vectors / np.maximum(length, 1e-12), 0.0)
+    return unit_vectors(np.cross(axis, along))
 
 
 def _faces(count: int, points: int) -> Int32Array:

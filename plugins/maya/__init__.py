@@ -142,15 +142,12 @@ def _curves(
         if not len(chosen):
             continue
         part = strands.select(chosen)
-        text, ends = format_rows(b"\t\t%.9g %.9g %.9g\n", space.points_to_file(part.points))
-        places = [0, *ends[part.offsets[1:] - 1].tolist()]
+        points, ends = space.points_to_file(part.points), part.offsets.tolist()
         pieces = []
-        for strand, count, start, stop in zip(
-            chosen.tolist(), part.counts.tolist(), places, places[1:], strict=False
-        ):
+        for strand, start, stop in zip(chosen.tolist(), ends, ends[1:], strict=False):
             name = b"%s_%0*d" % (kind, digits, strand)
-            pieces.append(_template(count) % (name, group, name, group, name))
-            pieces += (text[start:stop], b"\t\t;\n")
+            pieces.append(_template(stop - start) % (name, group, name, group, name))
+            pieces += (format_rows(b"\t\t%.9g %.9g %.9g\n", points[start:stop]), b"\t\t;\n")
         yield b"".join(pieces)
 
 

@@ -251,13 +251,14 @@ def _world_matrices(nodes: list[_Node]) -> Float64Array:
 
 def _matrix(node: _Node) -> Float64Array:
     """Return a transform of row vectors: scale about its pivot, rotation about its own, place."""
+    from scipy.spatial.transform import Rotation  # it loads much of SciPy
 
     def vector(name: str) -> Float64Array:
         return node.vectors.get(name, _default(name))
 
-    turn = np.eye(3)
-    for axis in _ORDERS[node.order]:
-        turn = turn @ _turn("xyz".index(axis), np.radians(vector("r")["xyz".index(axis)]))
+    order = _ORDERS[node.order]
+    angles = vector("r")[["xyz".index(axis) for axis in order]]
+    turn = Rotation.from_euler(order, angles, degrees=True).as_matrix().T
     matrix = np.eye(4)
     matrix[:3, :3] = np.diag(vector("s")) @ turn
     after = vector("sp") + vector("spt") - vector("rp")
@@ -268,12 +269,3 @@ def _matrix(node: _Node) -> Float64Array:
 
 def _default(name: str) -> Float64Array:
     return np.ones(3) if name == "s" else np.zeros(3)
-
-
-def _turn(axis: int, angle: float) -> Float64Array:
-    """Return the rotation (3, 3) of row vectors about an axis."""
-    first, second = (axis + 1) % 3, (axis + 2) % 3
-    matrix = np.eye(3)
-    matrix[[first, second], [first, second]] = np.cos(angle)
-    matrix[first, second], matrix[second, first] = np.sin(angle), -np.sin(angle)
-    return matrix

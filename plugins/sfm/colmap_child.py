@@ -1,4 +1,4 @@
-"""The program that runs COLMAP on the photos of a folder, and writes what it found as model.npz.
+"""The program that runs COLMAP on the photos of a folder, and writes what it found to `target`.
 
 It uses no OpenCV. The folder has photos/ and masks/.
 """
@@ -40,7 +40,7 @@ def solve(task: dict[str, Any], _tell: Callable[[Any], None]) -> dict[str, Any]:
         database, folder / "photos", folder, _mapping(pycolmap, task["known"])
     )
     best = max(models.values(), key=lambda model: model.num_reg_images(), default=None)
-    np.savez(folder / "model.npz", **_arrays(best, len(task["focals"])))
+    np.savez(task["target"], **_arrays(best, len(task["focals"])))
     return {}
 
 

@@ -18,9 +18,8 @@ import numpy.typing as npt
 
 from hairkit import Camera, Mask, View
 from hairkit.arrays import Float64Array, Int64Array
-from hairkit.child_process import ChildError, Limits, ask_once
+from hairkit.child_process import ChildError, Limits, ask_for_arrays
 from hairkit.errors import InputError, MissingExtraError
-from hairkit.storage import read_npz
 from hairkit.types.mask import BACKGROUND
 
 MISSING = "sfm needs pycolmap, which is not installed: pip install 'hairkit[sfm]'"
@@ -79,12 +78,12 @@ def solve(
         known = all(view.focal_px for view in views)
         shared = len({(v.width, v.height, v.frame) for v in views}) == len(set(focals)) == 1
         task |= {"focals": focals, "centres": centres, "known": known, "shared": shared}
+        task |= {"do": "solve", "folder": folder}
         try:
-            ask_once(_PROGRAM, {"do": "solve", "folder": folder, **task}, Limits(seconds))
+            _, found = ask_for_arrays(_PROGRAM, task, Limits(seconds))
         except ChildError as error:
             cure = "; raise sfm.seconds" if error.limit else ""
             raise InputError(f"sfm: COLMAP {error}{cure}") from error
-        found = read_npz(Path(folder) / "model.npz")
     return _model(found, views)
 
 

@@ -22,10 +22,9 @@ from hairkit.grooming.adopt_strands import (
     ImportOptions,
     adopt,
     mean_look,
-    pack_strands,
     plain_widths,
-    rows_kept,
 )
+from hairkit.grooming.curve_sets import CurveSet, strands_of
 from hairkit.grooming.prepare_export import ExportOptions, prepare_export
 from hairkit.hookspecs import hookimpl
 from hairkit.io.byte_reader import ByteReader
@@ -34,7 +33,6 @@ from hairkit.io.file_format import Feature, FileFormat
 from hairkit.options import option
 from hairkit.storage import read_bytes, write_bytes, write_pieces
 from hairkit.types.groom import Groom
-from hairkit.types.strands import Strands
 
 from .binary import TfxHair, read_binary
 from .text import is_text, read_text
@@ -87,17 +85,15 @@ def import_groom(path: Path, options: Options) -> Groom:
     data = read_bytes(path)
     hair, counts = read_text(data, path) if is_text(data) else read_binary(ByteReader(data, path))
     points = options.space.points_to_head(hair.points.reshape(-1, 3))
-    strands, kept = pack_strands(points, counts, path)
     widths, uv, colours = None, None, None
     if hair.thickness is not None:
-        each = plain_widths(hair.thickness, options.space.metres, path)
-        widths = np.repeat(each[kept], strands.counts)
+        widths = np.repeat(plain_widths(hair.thickness, options.space.metres, path), counts)
     if hair.uv is not None:
-        uv = _flip_v(hair.uv[kept], options)
+        uv = _flip_v(hair.uv, options)
     if hair.colours is not None:
-        colours = hair.colours.reshape(-1, 3)[rows_kept(counts, kept)]
-    strands = Strands(strands.points, strands.offsets, widths, uv)
-    return adopt(strands, options, path, mean_look(strands, colours))
+        colours = hair.colours.reshape(-1, 3)
+    strands, kept = strands_of(CurveSet(points, counts, widths, uv, colours), path)
+    return adopt(strands, options, path, mean_look(strands, kept.colour))
 
 
 def _resample(groom: Groom, count: int) -> Groom:

@@ -13,15 +13,17 @@ from hairkit.arrays import Float32Array, Int32Array
 from hairkit.errors import FormatError, InputError
 from hairkit.head_model.skinning import JOINT_NAMES
 from hairkit.io.coordinate_space import FileSpace
+from hairkit.io.plain_settings import capsules_of
 from hairkit.types.head import Head
 
 from .guarded import Contents
-from .settings import capsules_from, numbers
 
 _log = logging.getLogger("hairkit")
 
 
-def read_head(found: Contents, space: FileSpace, path: Path) -> Head | None:
+def read_head(
+    found: Contents, settings: dict[str, Any], space: FileSpace, path: Path
+) -> Head | None:
     """Return the head whose mesh has hairkit's scalp; None where no mesh has it."""
     meshes = found.description["meshes"]
     if not meshes:
@@ -33,16 +35,15 @@ def read_head(found: Contents, space: FileSpace, path: Path) -> Head | None:
     missing = [name for name, array in arrays.items() if array is None]
     if missing:
         raise FormatError(f"{path}: {mesh['path']} lacks {missing[0]}")
-    settings = found.description["settings"]
     try:
         return Head(
             _place(arrays["points"], mesh, space),
             _triangles(arrays["faceVertexCounts"], arrays["faceVertexIndices"]),
             np.asarray(arrays["st"]),
             np.asarray(arrays["hairkit:scalp"]),
-            _landmarks(settings, len(np.asarray(arrays["points"])), path),
+            settings.get("landmark_vertices"),
             _joints(found, space, path),
-            capsules_from(settings, path),
+            capsules_of(settings),
         )
     except InputError as error:
         raise FormatError(f"{path}: {mesh['path']} is no head: {error}") from error
@@ -63,15 +64,6 @@ def _triangles(counts: Any, indices: Any) -> Int32Array:
     if (counts != 3).any() or len(indices) != 3 * len(counts):
         raise InputError("its faces are not triangles")
     return np.asarray(indices, np.int32).reshape(-1, 3)
-
-
-def _landmarks(settings: dict[str, Any], vertices: int, path: Path) -> Int32Array | None:
-    if settings.get("landmarks") is None:
-        return None
-    index = numbers(settings["landmarks"], (-1,), path, "landmarks")
-    if ((index < 0) | (index >= vertices)).any():
-        raise InputError("its landmarks name vertices that it does not have")
-    return index.astype(np.int32)
 
 
 def _joints(found: Contents, space: FileSpace, path: Path) -> Float32Array:

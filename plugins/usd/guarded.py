@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import json
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,9 +11,9 @@ from typing import Any
 
 import numpy.typing as npt
 
-from hairkit.child_process import ChildError, Limits, ask_once
+from hairkit.child_process import ChildError, Limits, ask_for_arrays
 from hairkit.errors import FormatError, InputError, MissingExtraError
-from hairkit.storage import open_file, read_npz
+from hairkit.storage import open_file
 from hairkit.system import utf8_name
 
 from .stage import MISSING
@@ -55,23 +54,16 @@ def contents(path: Path) -> Contents:
     size = path.stat().st_size
     if size > MAX_BYTES:
         raise InputError(f"{path}: {size} bytes, hairkit reads up to {MAX_BYTES}")
-    with tempfile.TemporaryDirectory(prefix="hairkit-usd-") as folder:
-        archive = Path(folder) / "contents.npz"
-        answer = run(path, archive, SECONDS + size / 1e6)
-        if "error" in answer:
-            kind = InputError if answer.get("kind") == "refused" else FormatError
-            start = f"{path}: " if kind is InputError else f"{path}: not a readable USD file: "
-            raise kind(start + str(answer["error"]))
-        arrays = read_npz(archive)
-    description = json.loads(arrays["description"].tobytes())
-    return Contents(arrays, description)
-
-
-def run(path: Path, archive: Path, seconds: float) -> dict[str, Any]:
-    """Return the program's answer; raises `FormatError` when it crashed or took too long."""
-    question = {"do": "read", "source": str(path.resolve()), "target": str(archive)}
-    memory = MEMORY + 8 * path.stat().st_size
+    question = {"do": "read", "source": str(path.resolve())}
+    memory = MEMORY + 8 * size
+    limits = Limits(SECONDS + size / 1e6, memory)
     try:
-        return ask_once(_PROGRAM, question, Limits(seconds, memory), memory)
+        answer, arrays = ask_for_arrays(_PROGRAM, question, limits, memory)
     except ChildError as error:
         raise FormatError(f"{path}: damaged or hostile: the USD library {error}") from error
+    if "error" in answer:
+        kind = InputError if answer.get("kind") == "refused" else FormatError
+        start = f"{path}: " if kind is InputError else f"{path}: not a readable USD file: "
+        raise kind(start + str(answer["error"]))
+    description = json.loads(arrays["description"].tobytes())
+    return Contents(arrays, description)

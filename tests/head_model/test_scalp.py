@@ -126,7 +126,7 @@ def test_a_thin_scalp_is_covered_in_one_go(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 def test_taking_free_points_equals_the_slow_rule() -> None:
-    """The compiled kernel takes just those points that have none of the taken within the radius."""
+    """It takes just those points that have none of the taken within the radius."""
     points = np.random.default_rng(3).random((400, 3))
     wanted: list[int] = []
     for radius in (0.3, 0.15):

@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from hairkit.head_model.bvh import build_tree, inside_surface, nearest_on_surface
-from hairkit.head_model.signed_distance import closed_surface, distance_to, signed_distance
+from hairkit.head_model.signed_distance import BAND, closed_surface, distance_to, signed_distance
 from hairkit.head_model.template import default_head
 from hairkit.types.head import Capsules, Head
 from hairkit.types.volume import VoxelGrid
@@ -43,23 +43,22 @@ def test_grid_sees_a_ball_as_its_formula() -> None:
     ball = _ball()
     found = signed_distance(_head(ball.vertices, ball.faces), GRID)
     wanted = np.linalg.norm(GRID.centres().astype(np.float64), axis=3) - 0.08
-    near = np.abs(wanted) < 0.02
-    assert np.abs(found - wanted)[near].max() < 8e-4
-    assert np.abs(found - wanted)[near].mean() < 5e-5
+    near = np.abs(wanted) < BAND
+    assert np.abs(found - wanted)[near].max() < 1e-4
     assert np.abs(found - wanted)[~near].max() < 2.5e-3
     assert np.array_equal(found < 0, wanted < 0)
 
 
 def test_grid_agrees_with_points_on_the_head() -> None:
-    """Same signs everywhere; near the head 0.05 mm on average, nowhere off by half a cell."""
+    """Same signs everywhere; exact near the head, nowhere off by a cell."""
     grid = VoxelGrid.around([-0.11, -0.28, -0.12], [0.11, 0.1, 0.14], 0.004)
     head = default_head()
     found = signed_distance(head, grid).reshape(-1)[::7]
     wanted = distance_to(head, grid.centres().reshape(-1, 3)[::7])
-    near = np.abs(wanted) < 0.02
-    assert np.abs(found - wanted)[near].mean() < 3e-5
-    assert np.abs(found - wanted)[near].max() < 1e-3
-    assert np.abs(found - wanted).max() < 0.002
+    near = np.abs(wanted) < BAND
+    assert np.abs(found - wanted)[near].max() < 1e-6
+    assert np.abs(found - wanted).max() < 0.0035
+    assert np.abs(found - wanted).mean() < 0.0003
     assert (found >= 0).tolist() == (wanted >= 0).tolist()
 
 

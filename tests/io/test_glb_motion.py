@@ -126,7 +126,7 @@ def test_cubic_splines_keep_their_slopes(tmp_path: Path) -> None:
                     (1, "scale", "STEP", [0], [[1, 1, 1]])], "no node is named head"),
         ([{}], [(0, "translation", "LINEAR", [0, 1e9], [[0, 0, 0]] * 2)], "lasts 1e"),
         ([{}], [(0, "translation", "LINEAR", [1, 0], [[0, 0, 0]] * 2)], "do not ascend"),
-        ([{}], [(0, "rotation", "LINEAR", [0, 1], [[0, 0, 0, 0]] * 2)], "length 0"),
+        ([{}], [(0, "rotation", "LINEAR", [0, 1], [[0, 0, 0, 0]] * 2)], "zero norm"),
         ([{}], [(0, "scale", "LINEAR", [0, 1], [[0, 0, 0]] * 2)], "scaled to nothing"),
         ([{"children": [1]}, {"children": [0]}],
          [(0, "scale", "LINEAR", [0, 1], [[1, 1, 1]] * 2)], "loop"),

@@ -55,7 +55,7 @@ def stage_digests(roots: Roots, monkeypatch: pytest.MonkeyPatch) -> dict[str, st
         ("hairkit/imaging/geodesic.py", "segment"),
         ("hairkit/head_model/signed_distance.py", "hull"),
         ("hairkit/field/diffusion.py", "field"),
-        ("hairkit/helices/floating_tangents.py", "track"),
+        ("hairkit/helices/floating_tangents.py", ""),
         ("hairkit/grooming/head_collision.py", "track"),
         ("hairkit/io/strokes.py", "segment"),
         ("hairkit/simulation/wind.py", ""),

@@ -99,15 +99,6 @@ def test_sharp_turns_are_uncertain() -> None:
     assert (strict.lengths() < 0.8 * kind.lengths()).all()
 
 
-def test_inertia_at_the_root_bends_strands_more_slowly() -> None:
-    """Across a field that stands 20 degrees to the vertical they leave later."""
-    none, some = (
-        track(filled(), constant(tilted(20)), crown(), replace(FREE, root_inertia=share))
-        for share in (0.0, 0.8)
-    )
-    assert (some.tips - some.roots)[:, 0].mean() < (none.tips - none.roots)[:, 0].mean() - 0.002
-
-
 def swirl(seed: int) -> Volumes:
     """A field that turns about an axis and rises, in a ball of hair."""
     axis = np.random.default_rng(seed).normal(size=3)
@@ -145,7 +136,7 @@ def walk(volumes: Volumes, rules: Rules, p: Float64Array, d: Float64Array) -> Fl
 @pytest.mark.parametrize("seed", range(12))
 def test_the_walk_equals_its_readable_twin(seed: int) -> None:
     """The same points within a hundredth of a cell, and as many of them."""
-    volumes, rules = swirl(seed), Rules(0.75 * SPACING, np.cos(np.pi / 3.7), 4, 0.0)
+    volumes, rules = swirl(seed), Rules(0.75 * SPACING, np.cos(np.pi / 3.7), 4)
     start = np.random.default_rng(100 + seed).normal(size=3)
     start *= 0.042 / np.linalg.norm(start)
     way = start / np.linalg.norm(start)

