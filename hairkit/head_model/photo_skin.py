@@ -242,13 +242,11 @@ def _facing(surface: _Surface, camera: Camera) -> Float32Array:
 def _usable(camera: Camera, mask: Mask, photo: UInt8Array) -> Float32Array:
     """Return (H, W) 1 on skin and clothes away from hair and outline, where colours are whole."""
     shape = photo.shape[1], photo.shape[0]
-    distance = 1.0 if camera.model == "orthographic" else float(camera.depth(np.zeros(3)))
-    metre = camera.focal / max(distance, 1e-9)
     usable = np.ones(photo.shape[:2], np.float32)
     for beside, margin in ((mask.labels == PERSON, MARGIN), (~mask.hair, HAIR_MARGIN)):
         free = cv2.resize(beside.astype(np.uint8), shape, interpolation=cv2.INTER_AREA)
         away = cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_3)
-        usable *= np.clip(away / max(margin * metre, 1.0) - 0.5, 0, 1)
+        usable *= np.clip(away / max(margin * camera.pixels_per_metre, 1.0) - 0.5, 0, 1)
     brightest = cv2.max(cv2.max(photo[..., 0], photo[..., 1]), photo[..., 2])
     whole = np.clip((BLOWN - brightest.astype(np.float32)) / BLOWN_FADE, 0, 1)
     return np.asarray(usable * whole, np.float32)
