@@ -33,7 +33,7 @@ to 0.65 in eight path-traced captures."""
 
 LIGHT = 0.67
 """How bright hair is drawn under the light at its camera, over its colour, in linear light. With it
-the mean luma of hair drawn by its own cameras is 0.91 to 1.10 of the photos' on ten captures, of
+the mean luma of hair drawn by its own cameras is 0.93 to 1.15 of the photos' on ten captures, of
 straight hair more than of waves, whose locks shade each other; 1.6 where coils become straight."""
 
 DEPTH = 0.87
