@@ -61,8 +61,8 @@ REACH_OF_SECTION = 1.6
 """Cells within this many inscribed radii of the centre belong to a section."""
 SMOOTH_SECTIONS = 2.0
 """Standard deviation of the smoothing along a bundle, in sections."""
-RIM = 0.0025
-"""Metres by which the hull's bundle is thicker than the hair: half a cell and the masks' slack."""
+RIM = 0.0017
+"""Metres by which the hull's bundle is thicker than the hair: half a cell."""
 PINHOLE_CELLS = 3
 """Half width in cells of the holes that are closed in a bundle before its depth is measured."""
 THINNEST = 0.003

@@ -247,11 +247,11 @@ def _gather_evidence(views: Sequence[View], outlines: Sequence[Outline | None]) 
     known = [outline for outline in outlines if outline is not None]
     if len(known) < WHOLE_TURN:
         return Evidence.of(faces)
-    photos = [views[i].image for i in rows]
-    check_one_person([views[i] for i in rows], measure_clothes(photos, known))
+    seen = [views[i] for i in rows]
+    check_one_person(seen, measure_clothes([view.image for view in seen], known))
     alike, mirrored = compare_outlines(known)
     odd = measure_oddness(known, alike, mirrored)
-    skin = measure_skin(photos, known, [faces[i] for i in rows])
+    skin = measure_skin(seen, known)
     count, pairs = len(views), np.ix_(rows, rows)
     return Evidence.of(
         faces,

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
+from hairkit import View
 from hairkit.arrays import Float64Array, UInt8Array
 from hairkit.imaging.person_outline import DEPTHS, Outline
 from hairkit.types.face import Face
@@ -102,16 +103,15 @@ def measure_oddness(
     return np.asarray(odd + ODD_SHOULDER * np.log(np.maximum(shallow, 1.0)), np.float64)
 
 
-def measure_skin(
-    photos: Sequence[UInt8Array], outlines: Sequence[Outline], faces: Sequence[Face]
-) -> Float64Array | None:
+def measure_skin(views: Sequence[View], outlines: Sequence[Outline]) -> Float64Array | None:
     """Return (V, 2): share of the head that is skin, and its sideways moment in head widths.
 
-    Skin is what has the colour of the sure faces' cheeks. Its share falls from the front to the
+    Skin is what has the colour of the sure faces' cheeks, and is no hair where that is told: hair
+    in the sun may have its colour. Its share falls from the front to the
     back; its moment is negative from the subject's left, where the face lies on the left. None
     without a sure face.
     """
-    samples = [_cheeks(p, f) for p, f in zip(photos, faces, strict=True) if f.sure]
+    samples = [_cheeks(v.image, v.face) for v in views if v.face is not None and v.face.sure]
     samples = [sample for sample in samples if len(sample)]
     if not samples:
         return None
@@ -120,8 +120,8 @@ def measure_skin(
     near = (np.abs(colour - usual) < SKIN_OUTLIER).all(1)
     precision = np.asarray(np.linalg.inv(np.cov((colour[near] - usual).T) + SKIN_SLACK), np.float64)
     return np.array([
-        _skin_moments(photo, outline, usual, precision)
-        for photo, outline in zip(photos, outlines, strict=True)
+        _skin_moments(view, outline, usual, precision)
+        for view, outline in zip(views, outlines, strict=True)
     ])  # fmt: skip
 
 
@@ -151,9 +151,9 @@ def _shrink(photo: UInt8Array) -> tuple[UInt8Array, float]:
 
 
 def _skin_moments(
-    photo: UInt8Array, outline: Outline, usual: Float64Array, precision: Float64Array
+    view: View, outline: Outline, usual: Float64Array, precision: Float64Array
 ) -> Float64Array:
-    small, scale = _shrink(photo)
+    small, scale = _shrink(view.image)
     size = (small.shape[1], small.shape[0])
     inside = cv2.resize(outline.inside.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
     rows, columns = np.nonzero(inside)
@@ -162,6 +162,8 @@ def _skin_moments(
     off = _log_colour(small[rows, columns]) - usual
     squared = np.einsum("ni,ij,nj->n", off, precision, off)
     skin = np.exp(-squared / (2 * SKIN_WIDTH))
+    if view.person is not None and view.person.hair.size:
+        skin *= 1 - cv2.resize(view.person.hair, size)[rows, columns] / 255
     sideways = (columns - columns.mean()) / (outline.width_px * scale)
     return np.array([skin.mean(), (skin * sideways).mean()])
 

