@@ -6,8 +6,10 @@ Fits the head of every capture and takes its skin from the photos, then draws th
 without light, at the input cameras. Compared are pixels above the neck where the head is seen and
 the mask shows neither hair nor background, 4 mm from both, without the eyes. "Evened" gives each
 view the gain a channel that suits it best, as exposures differ; "relit" the light from all sides
-that does, a polynomial of second degree in the normal for each channel. Prints a Markdown table:
-PSNR in decibels, and seconds of the processor for the skin.
+that does, a polynomial of second degree in the normal for each channel. "Uneven" are the standard
+deviations of brightness (green) and of red over green on the whole head beside eyes, nose and
+mouth, which light, shadow and painted strands raise. Prints a Markdown table: PSNR in decibels,
+unevenness in per cent, and seconds of the processor for the skin.
 """
 
 from __future__ import annotations
@@ -21,12 +23,14 @@ from typing import Any
 import cv2
 import numpy as np
 from captures_argument import NO_CAPTURES, add_captures
+from scipy.spatial import cKDTree
 
 from hairkit.arrays import BoolArray, Float64Array
 from hairkit.cameras.depth_raster import head_depth
 from hairkit.head_model.delighting import GAMMA, harmonics
+from hairkit.head_model.exposures import FLOOR
 from hairkit.head_model.eye_colours import mark_beside_eyes
-from hairkit.head_model.photo_skin import photograph_skin
+from hairkit.head_model.photo_skin import FEATURE, photograph_skin
 from hairkit.head_model.scalp import bind
 from hairkit.hookspecs import hookimpl
 from hairkit.io.capture_reader import read_capture
@@ -34,14 +38,17 @@ from hairkit.manager import Manager
 from hairkit.pipeline.head_alone import photograph_head
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture
-from hairkit.types.head import Head
+from hairkit.types.head import JAW_LANDMARKS, Head
 from hairkit.types.mask import PERSON, Mask
 from hairkit.types.scene import Scene
+from hairkit.types.skin import Texture
 
 MARGIN = 0.004
 """Metres from hair and background within which pixels are not compared."""
 HEIGHT = 360
 """Rows of the pictures that are compared."""
+BLUR = 0.002
+"""Metres over which the map is smoothed before its unevenness is measured: grain does not count."""
 LEAST_PIXELS = 200
 """Views that show fewer pixels of skin are left out."""
 
@@ -66,7 +73,8 @@ def main() -> int:
     if captures is None:
         print(NO_CAPTURES)
         return 0
-    print("| capture | PSNR | evened | relit | worst relit | skin, s |\n|---|---|---|---|---|---|")
+    print("| capture | PSNR | evened | relit | worst relit | uneven: brightness | red | skin, s |")
+    print("|---|---|---|---|---|---|---|---|")
     rows = []
     for folder in sorted(path.parent for path in captures.glob("*/photos")):
         rows.append(figures(folder))
@@ -81,7 +89,7 @@ def row(name: str, values: Float64Array) -> str:
 
 
 def figures(folder: Path) -> Float64Array:
-    """Return mean PSNR as it is, evened and relit, the worst view's, and seconds of the skin."""
+    """Return mean PSNR as it is, evened and relit, the worst view's, unevenness, and seconds."""
     capture, scene, masks = fit(folder)
     photograph_skin(capture, scene, masks)  # compiles its kernels
     began = time.process_time()
@@ -102,7 +110,20 @@ def figures(folder: Path) -> Float64Array:
         lit = _relight(drawn, normals, wanted)
         scores.append([_psnr(drawn, wanted), _psnr(drawn * gain, wanted), _psnr(lit, wanted)])
     mean = np.mean(scores, axis=0)
-    return np.array([*mean, np.min(scores, axis=0)[2], seconds])
+    return np.array([*mean, np.min(scores, axis=0)[2], *uneven(scene.head, maps.albedo), seconds])
+
+
+def uneven(head: Head, albedo: Texture) -> Float64Array:
+    """Return the standard deviations (2,), per cent, of green and of red over green."""
+    assert head.landmark_vertices is not None
+    inner = head.vertices[head.landmark_vertices[JAW_LANDMARKS:]]
+    skin = cKDTree(inner).query(head.vertices)[0] > FEATURE + BLUR
+    skin &= head.vertices[:, 1] > head.joints[0, 1] + BLUR
+    skin[head.eye_vertices] = False
+    blurred = cv2.GaussianBlur(albedo.pixels, (0, 0), 1000 * BLUR * len(albedo.pixels) / 512)
+    smooth = Texture.encode(np.asarray(blurred, np.uint8))
+    red, green = np.log(255 * smooth.sample(head.uv[skin])[:, :2] + FLOOR).T
+    return np.asarray(100 * np.array([green.std(), (red - green).std()]), np.float64)
 
 
 def fit(folder: Path) -> tuple[Capture, Scene, tuple[Mask, ...]]:

@@ -240,13 +240,14 @@ def render(
     from hairkit.imaging.picture_file import write_picture
     from hairkit.rendering import draw
     from hairkit.rendering.framing import framing_cameras
-    from hairkit.simulation.posing import pose_groom
+    from hairkit.simulation.posing import pose_groom, pose_hair
 
     shown = _open(groom, manager)
+    hair = densify(shown, hairs, seed)
     if cache is not None:
         motion = cache if isinstance(cache, PointCache) else PointCache.load(cache)
+        hair = pose_hair(shown, hair, motion, frame)
         shown = pose_groom(shown, motion, frame)
-    hair = densify(shown, hairs, seed)
     if not isinstance(camera, Camera):
         points = np.concatenate([shown.head.vertices, hair.points])
         camera = framing_cameras(points, [_direction(camera)], *size)[0]

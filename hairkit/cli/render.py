@@ -15,13 +15,15 @@ from hairkit.cli.settings import add_setting, importer_of, split_settings
 from hairkit.cli.written import add_json, check_target, print_written
 from hairkit.errors import InputError
 from hairkit.grooming.densify import densify
+from hairkit.grooming.guide_weights import guide_mask
+from hairkit.grooming.prepare_export import select_strands
 from hairkit.imaging.picture_file import write_picture
 from hairkit.io.capture_reader import TURN
 from hairkit.manager import Manager
 from hairkit.pipeline.open_groom import load_groom
 from hairkit.rendering import Lights, draw_views
 from hairkit.rendering.framing import framing_cameras
-from hairkit.simulation.posing import pose_groom
+from hairkit.simulation.posing import pose_groom, pose_hair
 from hairkit.types.camera import Camera
 from hairkit.types.groom import Groom
 from hairkit.types.point_cache import read_cache
@@ -76,10 +78,9 @@ def register(subparsers: Any) -> None:
 def run(args: argparse.Namespace) -> int:
     """Draw and print the names of the pictures."""
     check_target(args.output)
-    groom = _pose_groom(args)
     if not 1 <= args.hairs <= MOST_HAIRS:
         raise InputError(f"--hairs is {args.hairs}, expected 1 to {MOST_HAIRS}")
-    hair = densify(groom, args.hairs, args.seed)
+    groom, hair = _hair_and_head(args)
     cameras = _cameras(args, groom.head.vertices, hair)
     paths = _paths(args.output, len(cameras))
     light = Lights.at_camera(cameras[0]) if len(cameras) > 1 else None
@@ -99,17 +100,20 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _pose_groom(args: argparse.Namespace) -> Groom:
-    """Return the groom, at the frame of its simulation where one is given."""
+def _hair_and_head(args: argparse.Namespace) -> tuple[Groom, Strands]:
+    """Return the groom and full hair, at the frame of its simulation where one is given."""
     manager = Manager.loaded(args.plugin)
     reader = importer_of(manager, args.groom)
     settings = split_settings(manager, {"reader": reader}, args.set)
     groom = load_groom(manager, args.groom, settings["reader"])
+    if args.cache is None and args.frame is not None:
+        raise InputError(f"--frame {args.frame} needs --cache with a simulation of the groom")
+    hair = densify(groom, args.hairs, args.seed)
     if args.cache is None:
-        if args.frame is not None:
-            raise InputError(f"--frame {args.frame} needs --cache with a simulation of the groom")
-        return groom
-    return pose_groom(groom, read_cache(args.cache, groom), args.frame or 0)
+        return groom, hair
+    guides = select_strands(groom, guide_mask(groom.strands))
+    cache, frame = read_cache(args.cache, guides), args.frame or 0
+    return pose_groom(groom, cache, frame), pose_hair(groom, hair, cache, frame)
 
 
 def _cameras(args: argparse.Namespace, head: Any, hair: Strands) -> list[Camera]:

@@ -14,9 +14,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from hairkit.arrays import Float32Array, Float64Array, Int64Array
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
 from hairkit.errors import InputError
 from hairkit.grooming.locks import (
+    STRAY_WIDTH,
     USUAL_LOCKS,
     LockOptions,
     gather,
@@ -93,12 +94,15 @@ def densify(
     positions, uv = _new_roots(guides, bundle, count - len(strands), roots, seed, generator)
     mix = _choose_guides(bundle, positions)
     course, nearest = positions[:, None] + _mix_courses(bundle, mix), mix.guides[:, 0]
+    stray = np.zeros(len(positions), bool)
     if locks is None:
         new = course + bundle.waves[nearest]
     else:
         curly = material.curl_radius > 0  # else the waves are bends, which must stay as they are
-        new = _lay_in_locks(bundle, course, locks if curly else replace(locks, curl=0), generator)
-    return _join(even, new, nearest, uv, material)
+        stray = generator.random(len(course)) < locks.stray
+        locks = locks if curly else replace(locks, curl=0)
+        new = _lay_in_locks(bundle, course, locks, stray, generator)
+    return _join(even, new, nearest, stray, uv, material)
 
 
 def roots_between(guides: Groom, count: int, seed: int = 0) -> Roots:
@@ -240,14 +244,17 @@ def _shape_lengths(shapes: Float32Array) -> Float64Array:
 
 
 def _lay_in_locks(
-    bundle: _Bundle, course: Float32Array, locks: LockOptions, generator: np.random.Generator
+    bundle: _Bundle,
+    course: Float32Array,
+    locks: LockOptions,
+    stray: BoolArray,
+    generator: np.random.Generator,
 ) -> Float32Array:
     """Return hair (N, m, 3) that follows its course (N, m, 3) in wisps, and these in locks."""
     wisps, waves = _wisps(bundle, locks)
     cells = np.floor(bundle.roots / locks.lock).astype(np.int64)
     middles = wisps[np.unique(cells, axis=0, return_index=True)[1]]
     wisps = gather(wisps, middles, locks.lock, np.full(len(wisps), locks.to_lock, np.float32))[0]
-    stray = generator.random(len(course)) < locks.stray
     hold = (1 - generator.random(len(course), dtype=np.float32) ** 2) * ~stray
     course = gather(course, middles, locks.lock, locks.to_lock * hold)[0]
     course, which = gather(course, wisps, locks.wisp, locks.to_wisp * hold)
@@ -286,6 +293,7 @@ def _join(
     even: Strands,
     new: Float32Array,
     nearest: Int64Array,
+    stray: BoolArray,
     uv: Float32Array | None,
     material: HairMaterial,
 ) -> Strands:
@@ -293,10 +301,12 @@ def _join(
     total = old + count
     keep_uv = uv is not None and even.root_uv is not None
     group = None if even.group is None else np.concatenate([even.group, even.group[nearest]])
+    widths = strand_widths(total, np.linspace(0, 1, m), material.width)
+    widths[old:][stray] *= STRAY_WIDTH
     return Strands(
         np.concatenate([even.points, new.reshape(-1, 3)]),
         np.arange(total + 1) * m,
-        strand_widths(total, np.linspace(0, 1, m), material.width).ravel(),
+        widths.ravel(),
         np.concatenate([even.root_uv, uv]) if keep_uv else None,
         group,
         np.arange(total) < old,

@@ -65,8 +65,8 @@ def follow(
 ) -> Float32Array:
     """Return (T, P, 3) all strands moved with their guides.
 
-    Each hair keeps its offset, seen from the head, from the weighted guides at the same share of
-    its length.
+    Each hair keeps its offset, seen from the head, from the weighted guides at the same distance
+    from the root; hair that is longer than a guide, at the same share of its length.
 
     Parameters
     ----------
@@ -114,7 +114,10 @@ def _places_on_guides(strands: Strands, mix: GuideWeights) -> tuple[Int64Array, 
     rank = np.arange(len(strands.points)) - strands.offsets[:-1][owner]
     along = rank / (counts[owner] - 1)
     guide = mix.guides[owner]
-    place = along[:, None] * (counts[guide] - 1)
+    length = np.maximum(strands.lengths(), 1e-9)
+    # short hair goes with the first part of a long guide, whose tip moves much further
+    part_of = np.minimum(length[owner][:, None] / length[guide], 1)
+    place = along[:, None] * part_of * (counts[guide] - 1)
     before = np.minimum(place.astype(np.int64), counts[guide] - 2)
     part = (place - before).astype(np.float32)
     weight = mix.weights[owner]

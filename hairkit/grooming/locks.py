@@ -21,6 +21,9 @@ SWING = 0.4
 """Slow swing of a strand about its own line, in shares of the tip's wander."""
 STRAYING = 9.0
 """Wander of stray hairs over that of others."""
+STRAY_WIDTH = 0.4
+"""Width of stray hairs over that of others: they stand alone, where a drawn strand stands for a few
+hairs elsewhere."""
 MOST_WANDER, MOST_PULL = 0.2, 0.12
 """Wander of a tip, and its way to the middle of its lock, in shares of the strand's extent at most:
 locks of short hair are small."""

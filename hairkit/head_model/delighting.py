@@ -4,7 +4,7 @@ Seen skin is taken to have nearly one albedo. What its brightness owes to the di
 surface is the irradiance, a polynomial of second degree in the normal (Ramamoorthi and Hanrahan
 2001), fitted by robust least squares, so that brows, eyes and lips do not count. What is left over
 centimetres is light too, such as the shadow below the chin or of the hair (Horn 1974). The map is
-divided by both.
+divided by both, each channel by its own: the shadow of brown hair is orange.
 """
 
 from __future__ import annotations
@@ -21,8 +21,6 @@ Floats = npt.NDArray[np.floating[Any]]
 
 GAMMA = 2.2
 """Exponent from sRGB to linear light, close enough for ratios."""
-LUMINANCE = (0.2126, 0.7152, 0.0722)
-"""Weights of linear red, green and blue (ITU-R BT.709)."""
 STEP = 2
 """Texels between those to which light is fitted."""
 ROUNDS = 12
@@ -36,8 +34,8 @@ DARKEST, BRIGHTEST = 0.3, 2.5
 """Bounds of the irradiance, in shares of its mean."""
 REACH = 14.0
 """Sigma over which leftover brightness is light, texels of 1 mm: broader than brows and lips."""
-TAKEN, LARGEST = 0.8, 0.6
-"""Share of the leftover that is taken out, and its largest logarithm."""
+LARGEST = 0.6
+"""Largest logarithm of the leftover that is taken out."""
 LEAST = 1e-6
 """Least weight that is divided by."""
 
@@ -45,7 +43,9 @@ LEAST = 1e-6
 def find_shading(
     colours: Float32Array, weight: Float32Array, normals: Float32Array
 ) -> Float32Array:
-    """Return the factor (H, W) of the light in a map of colours, of mean 1 where skin is seen.
+    """Return the factors (H, W, 3) of the light in a map of colours, of mean 1 where skin is seen.
+
+    Each channel has its own: light from a window is bluer than what walls, hair and skin return.
 
     Parameters
     ----------
@@ -59,13 +59,17 @@ def find_shading(
     Returns
     -------
     shading
-        Factor of sRGB values: the linear light to the power of 1 / 2.2.
+        Factors of sRGB values: the linear light to the power of 1 / 2.2.
     """
-    seen = weight > 0
-    if not seen.any():
-        return np.ones(weight.shape, np.float32)
+    if not weight.any():
+        return np.ones(colours.shape, np.float32)
     linear = (np.maximum(colours, 1.0) / 255.0) ** GAMMA
-    brightness = linear @ np.array(LUMINANCE, np.float32)
+    return np.stack([_shade(channel, weight, normals) for channel in linear.transpose(2, 0, 1)], 2)
+
+
+def _shade(brightness: Floats, weight: Float32Array, normals: Float32Array) -> Float32Array:
+    """Return the factor (H, W) of one channel's light."""
+    seen = weight > 0
     step = STEP if seen[::STEP, ::STEP].any() else 1
     few = slice(None, None, step), slice(None, None, step)
     light = _fit_light(normals[few], brightness[few], weight[few])
@@ -74,7 +78,7 @@ def find_shading(
     trust = _agreement(brightness, np.maximum(shading, DARKEST * np.median(brightness[seen])))
     shading = np.clip(shading, DARKEST * mean, BRIGHTEST * mean)
     skin = np.asarray(weight * trust, np.float32)
-    shading *= np.exp(TAKEN * _leftover(brightness / shading, skin))
+    shading *= np.exp(_leftover(brightness / shading, skin))
     level = np.average(np.log(shading[seen]), weights=weight[seen])
     return np.asarray((shading / np.exp(level)) ** (1 / GAMMA), np.float32)
 

@@ -7,10 +7,10 @@ gain a channel, least squares over the texels that two views share. Views are bl
 (Burt and Adelson 1983): coarse colours in their gradients, details directly, both from the view
 that sees the texel best, so that seams neither show nor blur.
 
-What no view sees is taken from its mirror image where the texture coordinates are symmetric, then
-from the head's own skin, with the tone of the skin that is seen nearest to it: the ratio of the two
-is extended by normalised convolutions of growing reach. The light of the photos is taken out of the
-seen skin before (`hairkit.head_model.delighting`).
+The light of the photos is taken out of the seen skin (`hairkit.head_model.delighting`). What then
+differs from the face in colour, such as strands that masks miss, the edge of their shadow and
+collars, counts as unseen. What is unseen is taken from its mirror image where the texture
+coordinates are symmetric, then from the head's own skin in the mean tone of the seen.
 """
 
 from __future__ import annotations
@@ -46,14 +46,13 @@ COARSE = 512
 """Edge of the maps in which places, visibility and weights are found, texels."""
 STRIP = 128
 """Rows of the albedo map that are worked on at a time: a whole map of colours takes 50 MB."""
-TONE = 128
-"""Edge of the map in which tones are extended over what no view sees, texels."""
 LEAST_FACING, WHOLE_FACING = 0.15, 0.8
 """Cosines of the angle of view up to which a texel is not taken, and from which wholly."""
 HIDDEN = 0.004
 """Metres behind the first surface from which a texel is hidden."""
-MARGIN = 0.004
-"""Metres of skin beside hair and outline that are left out: masks and cameras are not exact."""
+MARGIN, HAIR_MARGIN = 0.004, 0.008
+"""Metres of skin beside the outline and beside hair that are left out: masks and cameras are not
+exact, and fine strands and their shadow lie beside the mask."""
 BAND = 3.0
 """Sigma between the two bands, texels of the coarse maps: 3 mm on the face."""
 SHARPNESS = 8
@@ -64,8 +63,8 @@ LEAST_SHARE = 0.01
 """Share of a texel's best view below which another view's photo is not looked up."""
 LEAST_SEEN = 0.08
 """Weight of all views together from which a texel counts as seen."""
-FILL_FADE = 3.0
-"""Sigma over which seen skin fades into filled skin, texels of the coarse maps."""
+FILL_FADE = 8.0
+"""Sigma over which seen skin fades into filled skin, texels of the coarse maps: 8 mm."""
 LARGEST_FACE = 0.1
 """Share of the texture's edge over which a face may reach."""
 MIRRORED = 0.01
@@ -73,7 +72,11 @@ MIRRORED = 0.01
 FEATURE = 0.014
 """Metres from landmarks of brows, nose, eyes and mouth within which colours may be any."""
 SURE_SKIN = 4
-"""Power of the likeness to skin from which tones are extended: half the spread of one photo's."""
+"""Power of the likeness to skin by which its tone is averaged: half the spread of one photo's."""
+AROUND = 3.0
+"""Sigma within which skin lies among skin, texels of the coarse maps."""
+LEAST_LIKE, WHOLLY_LIKE = 0.3, 0.7
+"""Likeness to skin up to which a texel is filled in, and from which it is kept."""
 STEP = 4
 """Texels between those at which exposures are measured."""
 
@@ -109,27 +112,28 @@ def photograph_skin(capture: Capture, scene: Scene, masks: Sequence[Mask]) -> Sk
     project = partial(_project, surface, scene.head)
     with ThreadPoolExecutor(thread_count()) as pool:
         views = list(pool.map(project, scene.cameras, photos, masks))
-    views = _skin_alone(views, scene.head, surface)
+    features = _features(scene.head, surface)
+    views = _skin_alone(views, features)
     gains = even_exposures(
         [view.coarse[::STEP, ::STEP] for view in views],
         [view.weight[::STEP, ::STEP] for view in views],
     )
     blended, seen = _blend(views, photos, gains)
     del views  # as much memory as the map itself
-    blended = _delight(blended, seen, surface)
+    blended = _delight(blended, seen, surface, features)
+    seen = _certain(blended, seen, features)
     if _is_symmetric(surface):
         blended, seen = _mirror(blended, seen)
-    pixels = _fill(blended, seen, surface, _own_skin(scene.head))
+    pixels = _fill(blended, seen, surface, features, _own_skin(scene.head))
     maps = scene.head.maps or SkinMaps()
     if has_default_eyes(scene.head):
         pixels = paint_over(pixels, *find_eye_colours(capture.views, gains))
     return SkinMaps(Texture.encode(pixels, lossless=False), maps.roughness, maps.normal, maps.bump)
 
 
-def _skin_alone(views: Sequence[_Seen], head: Head, surface: _Surface) -> list[_Seen]:
+def _skin_alone(views: Sequence[_Seen], features: BoolArray) -> list[_Seen]:
     """Return the views without what has not the colour of skin beside eyes, nose and mouth: collars
     on the neck, strands and their shadow on the temples."""
-    features = _features(head, surface)
     kept = []
     for view in views:
         skin = np.where(features, 1, like_skin(view.coarse, view.weight))
@@ -151,13 +155,25 @@ def _features(head: Head, surface: _Surface) -> BoolArray:
     return np.asarray(near)
 
 
-def _delight(blended: Float32Array, seen: Float32Array, surface: _Surface) -> Float32Array:
+def _delight(
+    blended: Float32Array, seen: Float32Array, surface: _Surface, features: BoolArray
+) -> Float32Array:
     """Return the colours (S, S, 3), in their place, without the light of the photos."""
     coarse = _shrink(blended, COARSE)
-    shading = find_shading(coarse, seen * like_skin(coarse, seen), surface.normals)
+    shading = find_shading(coarse, seen * like_skin(coarse, seen, features), surface.normals)
     for rows in _strips():
-        blended[rows] /= _enlarge_rows(shading, rows)[..., None]
+        blended[rows] /= _enlarge_rows(shading, rows)
     return blended
+
+
+def _certain(blended: Float32Array, seen: Float32Array, features: BoolArray) -> Float32Array:
+    """Return the weights (C, C) of texels that have the skin's colour, and around them too, or lie
+    at eyes, nose and mouth: not strands, the edge of their shadow, collars."""
+    likeness = like_skin(_shrink(blended, COARSE), seen, features)
+    within = cv2.GaussianBlur((seen > 0).astype(np.float32), (0, 0), AROUND)
+    around = cv2.GaussianBlur(likeness, (0, 0), AROUND) / np.maximum(within, LEAST)
+    share = (np.minimum(around, likeness) - LEAST_LIKE) / (WHOLLY_LIKE - LEAST_LIKE)
+    return np.asarray(seen * np.where(features, 1, np.clip(share, 0, 1)), np.float32)
 
 
 def _unwrap(head: Head) -> _Surface:
@@ -226,14 +242,14 @@ def _facing(surface: _Surface, camera: Camera) -> Float32Array:
 def _usable(camera: Camera, mask: Mask, photo: UInt8Array) -> Float32Array:
     """Return (H, W) 1 on skin and clothes away from hair and outline, where colours are whole."""
     shape = photo.shape[1], photo.shape[0]
-    skin = cv2.resize((mask.labels == PERSON).astype(np.uint8), shape, interpolation=cv2.INTER_AREA)
-    away = cv2.distanceTransform(skin, cv2.DIST_L2, cv2.DIST_MASK_3)
-    distance = 1.0 if camera.model == "orthographic" else float(camera.depth(np.zeros(3)))
-    margin = MARGIN * camera.focal / max(distance, 1e-9)
-    inside = np.clip(away / max(margin, 1.0) - 0.5, 0, 1)
+    usable = np.ones(photo.shape[:2], np.float32)
+    for beside, margin in ((mask.labels == PERSON, MARGIN), (~mask.hair, HAIR_MARGIN)):
+        free = cv2.resize(beside.astype(np.uint8), shape, interpolation=cv2.INTER_AREA)
+        away = cv2.distanceTransform(free, cv2.DIST_L2, cv2.DIST_MASK_3)
+        usable *= np.clip(away / max(margin * camera.pixels_per_metre, 1.0) - 0.5, 0, 1)
     brightest = cv2.max(cv2.max(photo[..., 0], photo[..., 1]), photo[..., 2])
     whole = np.clip((BLOWN - brightest.astype(np.float32)) / BLOWN_FADE, 0, 1)
-    return np.asarray(inside * whole, np.float32)
+    return np.asarray(usable * whole, np.float32)
 
 
 def _blend(
@@ -359,25 +375,25 @@ def _own_skin(head: Head) -> UInt8Array:
 
 
 def _fill(
-    blended: Float32Array, seen: Float32Array, surface: _Surface, own: UInt8Array
+    blended: Float32Array,
+    seen: Float32Array,
+    surface: _Surface,
+    features: BoolArray,
+    own: UInt8Array,
 ) -> UInt8Array:
     """Return (S, S, 3) the blended skin, and the head's own in the seen skin's tone elsewhere."""
     taken = (seen >= LEAST_SEEN) & surface.known
     if not taken.any():
         return own
-    mask = taken.astype(np.float32)
-    weight = _shrink(mask, TONE)
-    small = _shrink(_shrink(blended, COARSE) * mask[..., None], TONE)
-    small /= np.maximum(weight, LEAST)[..., None]
-    own_tone = np.concatenate([_shrink(own[rows].astype(np.float32), TONE) for rows in _strips()])
-    ratio = np.log(np.maximum(small, 0) + FLOOR) - np.log(own_tone + FLOOR)
-    tone = np.exp(extend_tones(ratio, weight * like_skin(small, weight) ** SURE_SKIN))
+    colours = _shrink(blended, COARSE)
+    plain = cv2.resize(own, (COARSE, COARSE), interpolation=cv2.INTER_AREA).astype(np.float32)
+    ratio = np.log(np.maximum(colours, 0) + FLOOR) - np.log(plain + FLOOR)
+    sure = seen * like_skin(colours, seen, features) ** SURE_SKIN + LEAST
+    tone = np.exp(np.average(ratio[taken], axis=0, weights=sure[taken])).astype(np.float32)
     share = 1 - _fade(~taken)
     filled = np.empty_like(own)
     for rows in _strips():
-        skin = _enlarge_rows(tone, rows)
-        skin *= own[rows] + np.float32(FLOOR)
-        skin -= FLOOR
+        skin = tone * (own[rows] + np.float32(FLOOR)) - np.float32(FLOOR)
         skin += (blended[rows] - skin) * _enlarge_rows(share, rows)[..., None]
         filled[rows] = np.rint(skin).clip(0, 255)
     return filled

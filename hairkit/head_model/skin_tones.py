@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from hairkit.arrays import Float32Array, UInt8Array
+from hairkit.arrays import BoolArray, Float32Array, UInt8Array
 from hairkit.head_model.exposures import FLOOR
 
 SKIN_SPREAD = (0.35, 0.12, 0.12)
@@ -20,15 +20,22 @@ LEAST = 1e-6
 """Least weight that colours are divided by."""
 
 
-def like_skin(colours: Float32Array | UInt8Array, weight: Float32Array) -> Float32Array:
+def like_skin(
+    colours: Float32Array | UInt8Array, weight: Float32Array, known: BoolArray | None = None
+) -> Float32Array:
     """Return (T, T) how much colours are like most of the seen ones, 0 where none is seen.
 
-    Collars are not skin.
+    Collars are not skin. `known` are texels whose brighter half is, as brows and beards are not;
+    None: what is seen best.
     """
     seen = weight > 0
     red, green, blue = np.log(np.maximum(colours[seen], 0).T + np.float32(FLOOR))
     tones = [green, red - green, blue - green]
-    sure = [tone[weight[seen] > 0.5][::STEP] for tone in tones]
+    best = weight[seen] > 0.5
+    if known is not None and (best & known[seen]).any():
+        best &= known[seen]
+        best &= green >= np.median(green[best])
+    sure = [tone[best][::STEP] for tone in tones]
     away = [
         (tone - (np.median(known) if len(known) else np.float32(0))) / np.float32(spread)
         for tone, known, spread in zip(tones, sure, SKIN_SPREAD, strict=True)

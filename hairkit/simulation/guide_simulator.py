@@ -50,13 +50,7 @@ class GuideSimulator(ABC):
         touching = contact and len(groom.strands) > 0
         self._bodies: Bodies = groom_bodies(groom) if touching else NO_BODIES
         self._groom = select_strands(groom, guide_mask(groom.strands))
-        strands = self._groom.strands
-        points = strands.points.astype(np.float64)
-        length = np.linalg.norm(np.diff(points, axis=0, prepend=points[:1]), axis=1)
-        length[strands.offsets[:-1]] = 0.0
-        # points between nodes outside the head may still cut through it
-        deepest = np.minimum(self._bodies.at(strands.points)[0], DRAWN) - ROUNDING
-        self._drawn = Drawn(strands.offsets, length, deepest)
+        self._drawn = drawn_at_rest(self._groom.strands, self._bodies)
         self._rest_gravity = np.array([0.0, -groom.physics.gravity, 0.0])
 
     @property
@@ -114,11 +108,8 @@ class GuideSimulator(ABC):
 
     def _draw(self) -> Points:
         """Return the guides' points (P, 3), head axes, each out of the obstacles."""
-        points, pose = self._carry(), self._torso_from_head()
-        strands = len(self._drawn.starts) - 1
-        parallel_for(
-            draw_points, strands, self._drawn, self._bodies.fields, pose, points, min_chunk=WORTH
-        )
+        points = self._carry()
+        keep_out(self._drawn, self._bodies, self._torso_from_head(), points)
         return points
 
     def _measure_drawn(self) -> tuple[float, float]:
@@ -132,3 +123,19 @@ class GuideSimulator(ABC):
         stretch = float(np.abs(now[long] / length[long] - 1).max(initial=0.0))
         depth = self._bodies.deepest(points, self._torso_from_head(), self._drawn.deepest)
         return stretch, depth
+
+
+def drawn_at_rest(strands: Strands, bodies: Bodies) -> Drawn:
+    """Return lengths and depths that the points of strands keep when they are drawn."""
+    points = strands.points.astype(np.float64)
+    length = np.linalg.norm(np.diff(points, axis=0, prepend=points[:1]), axis=1)
+    length[strands.offsets[:-1]] = 0.0
+    # points between nodes outside the head may still cut through it
+    deepest = np.minimum(bodies.at(strands.points)[0], DRAWN) - ROUNDING
+    return Drawn(strands.offsets, length, deepest)
+
+
+def keep_out(drawn: Drawn, bodies: Bodies, torso_from_head: Float64Array, points: Points) -> None:
+    """Move points (P, 3), head axes, in their place: out of the bodies, as far apart as at rest."""
+    count = len(drawn.starts) - 1
+    parallel_for(draw_points, count, drawn, bodies.fields, torso_from_head, points, min_chunk=WORTH)

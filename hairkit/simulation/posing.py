@@ -7,9 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from hairkit.errors import InputError
+from hairkit.grooming.guide_weights import follow, guide_mask
 from hairkit.head_model.skinning import HEAD_JOINT, head_weights
+from hairkit.simulation.guide_simulator import drawn_at_rest, keep_out
+from hairkit.simulation.obstacles import groom_bodies
+from hairkit.simulation.rigid_motion import follow_head, inverse_motion, transform_points
 from hairkit.types.groom import Groom
 from hairkit.types.point_cache import PointCache
+from hairkit.types.strands import Strands
 
 
 def pose_groom(groom: Groom, cache: PointCache, frame: int) -> Groom:
@@ -19,17 +24,39 @@ def pose_groom(groom: Groom, cache: PointCache, frame: int) -> Groom:
     Negative frames count from the last. Raises `InputError` where the cache has no such frame or
     is of another groom.
     """
-    if not -len(cache) <= frame < len(cache):
-        raise InputError(f"frame {frame} of a cache of {len(cache)} frames, 0 to {len(cache) - 1}")
-    points = cache.points[frame]
-    if len(points) != len(groom.strands.points):
-        raise InputError(
-            f"a cache of {len(points)} points, the groom has {len(groom.strands.points)};"
-            " give the groom that was simulated"
-        )
+    strands = pose_hair(groom, groom.strands, cache, frame)
     motion, rest = cache.head_from_rest[frame], groom.head.vertices
     weight = head_weights(groom.head)[:, HEAD_JOINT, None]
     moved = rest @ motion[:3, :3].T + motion[:3, 3]
     vertices = (rest + weight * (moved - rest)).astype(np.float32)
-    head = replace(groom.head, vertices=vertices)
-    return replace(groom, strands=replace(groom.strands, points=points), head=head)
+    return replace(groom, strands=strands, head=replace(groom.head, vertices=vertices))
+
+
+def pose_hair(groom: Groom, hair: Strands, cache: PointCache, frame: int) -> Strands:
+    """Return hair that goes with the groom's guides as it is at a frame of their simulation.
+
+    `hair` is at rest: the groom's strands, then any that `densify` put between them. Locks stay
+    the locks they are; made anew in every frame they would not. Strands that follow keep their
+    length, and out of head and torso.
+    """
+    if not -len(cache) <= frame < len(cache):
+        raise InputError(f"frame {frame} of a cache of {len(cache)} frames, 0 to {len(cache) - 1}")
+    simulated = guide_mask(groom.strands)
+    guides, points = groom.strands.select(simulated), cache.points[frame]
+    if len(points) != len(guides.points):
+        raise InputError(
+            f"a cache of {len(points)} points, the groom's guides have {len(guides.points)};"
+            " give the groom that was simulated"
+        )
+    mask = np.zeros(len(hair), bool)
+    mask[np.flatnonzero(simulated)] = True
+    if (hair.counts[mask] != guides.counts).any():
+        points = guides.moved_and_resampled(points[None], int(hair.counts[0]))[0]
+    whole, motion = replace(hair, guide=mask), cache.head_from_rest[frame]
+    moved = follow(whole, points[None], motion[None])[0]
+    if not mask.all():
+        bodies, own = groom_bodies(groom), transform_points(inverse_motion(motion), moved)
+        torso = follow_head(np.eye(4), motion, bodies.joint)
+        keep_out(drawn_at_rest(hair, bodies), bodies, inverse_motion(torso) @ motion, own)
+        moved = transform_points(motion, own)
+    return replace(hair, points=moved.astype(np.float32))

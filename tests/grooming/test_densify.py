@@ -112,8 +112,13 @@ def test_equal_seeds_give_equal_hair() -> None:
 
 
 def test_widths_come_from_the_material() -> None:
-    """Roots are as wide as the material says, give or take; every strand thins to its tip."""
-    hair = densify(fan(5), 500, material=HairMaterial(width=1e-4))
+    """Roots are as wide as the material says, give or take; every strand thins to its tip, and
+    strays are thinner."""
+    material = HairMaterial(width=1e-4)
+    strays = densify(fan(5), 500, material=material, locks=LockOptions(stray=1)).widths
+    assert strays is not None
+    assert strays.reshape(500, -1)[5:, 0].max() < 0.6e-4
+    hair = densify(fan(5), 500, material=material, locks=LockOptions(stray=0))
     assert hair.widths is not None
     widths = hair.widths.reshape(500, -1)
     assert abs(widths[:, 0].mean() / 1e-4 - 1) < 0.01

@@ -101,3 +101,17 @@ def test_hair_stays_on_a_head_that_turns() -> None:
     wanted = strands.points @ motion[:3, :3].T + motion[:3, 3]
     frames = wanted[rows][None].astype(np.float32)
     assert np.allclose(follow(strands, frames, motion[None])[0], wanted, atol=1e-6)
+
+
+def test_short_hair_goes_with_the_near_part_of_long_guides() -> None:
+    """Beside guides of 30 cm that turn about their roots, hair of 3 cm moves as theirs does there:
+    its tip does not go where their tips go."""
+    along = np.linspace(0, 1, 11, dtype=np.float32)[:, None]
+    guides = [np.float32([x, 0, 0]) + 0.3 * along * np.float32([0, -1, 0]) for x in (-0.01, 0.01)]
+    short = 0.03 * along * np.float32([0, -1, 0])
+    points = np.concatenate([*guides, short])
+    strands = Strands(points, np.array([0, 11, 22, 33]), guide=np.array([True, True, False]))
+    raised = points[:22].copy()
+    raised[:, 1] *= -1
+    found = follow(strands, raised[None])[0][22:]
+    assert np.allclose(found, -short, atol=1e-6)
