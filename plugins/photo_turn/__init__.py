@@ -2,8 +2,8 @@
 
 Faces tell the azimuths of frontal photos. All other photos may be anywhere around the head, and
 what fits best is searched for (`.search`): faces lie where their yaw says, outlines of opposite
-views mirror each other and those of neighbours are alike, the share of skin falls from the face to
-the back, and steps are even rather than not. A photo without which the rest is a better turn is one
+views mirror each other, neighbours look alike, the share of skin falls from the face to the back,
+and steps are even rather than not. A photo without which the rest is a better turn is one
 from above. Where several arrangements fit nearly alike, all are handed on: their cameras tell.
 Frames of a video are in the order of time. What is no turn around one head is refused in one line.
 One or two photos, and more of which none shows the back, are no turn: their azimuths are those of
@@ -35,7 +35,13 @@ from hairkit.types.face import Face
 from hairkit.types.person import Person
 from hairkit.types.turnaround import Turnaround
 
-from .appearance import compare_outlines, measure_clothes, measure_oddness, measure_skin
+from .appearance import (
+    compare_heads,
+    compare_outlines,
+    measure_clothes,
+    measure_oddness,
+    measure_skin,
+)
 from .arrangement import SIDE_DEG, Evidence
 from .describe import Found, in_turn_order, name_views, summarise, tell_doubts
 from .refuse import (
@@ -70,6 +76,9 @@ FEW, PROFILE_SHARE = 4, 0.38
 """Photos at most of which none need be from behind, and the share of skin in a head's outline from
 which one without a face is a profile, over the largest with one: nine rendered heads have 0.38 to
 0.82 in profile, and from behind 0.36 at most, but curls 0.49 and tied hair 0.57."""
+CLOSE = 7
+"""Photos from which neighbours are near enough to look alike: of 6 of a turn of eight, with gaps,
+more turns would be sure and wrong."""
 NAMED_SPREAD = 1.0
 """Standard deviation of azimuths that the user names, degrees."""
 
@@ -248,7 +257,8 @@ def _gather_evidence(views: Sequence[View], outlines: Sequence[Outline | None]) 
     if len(known) < WHOLE_TURN:
         return Evidence.of(faces)
     seen = [views[i] for i in rows]
-    check_one_person(seen, measure_clothes([view.image for view in seen], known))
+    photos = [view.image for view in seen]
+    check_one_person(seen, measure_clothes(photos, known))
     alike, mirrored = compare_outlines(known)
     odd = measure_oddness(known, alike, mirrored)
     skin = measure_skin(seen, known)
@@ -258,6 +268,9 @@ def _gather_evidence(views: Sequence[View], outlines: Sequence[Outline | None]) 
         (_spread(alike, (count, count), pairs), _spread(mirrored, (count, count), pairs)),
         None if skin is None else _spread(skin, (count, skin.shape[1]), rows),
         np.nan_to_num(_spread(odd, (count,), rows)),
+        None
+        if len(known) < CLOSE
+        else _spread(compare_heads(photos, known), (count, count), pairs),
     )
 
 
