@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from turntable import Turntable, turntable
 
-from hairkit import Mask
+from hairkit import Capture, Mask, View
 from hairkit.arrays import Float64Array
 from hairkit.cameras.landmark_equations import LandmarkFit, Sights, shape_precision
 from hairkit.cameras.outlines import Outlines
 from hairkit.cameras.turntable import Turn
+from hairkit.types.face import Face
+from hairkit.types.person import Person
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +51,23 @@ def test_landmarks_under_hair_and_of_the_jaw_count_less(bust: Turntable) -> None
     assert set(open_air.noise[open_air.point < 17]) == {2.0}
     assert set(open_air.noise[open_air.point >= 17]) == {1.0}
     assert set(sights.noise / open_air.noise) <= {1.0, 3.0}
+
+
+def test_steep_faces_count_less_where_many_are_seen() -> None:
+    """Of more than four faces those turned by 44 degrees or more are not relied on."""
+    yaws = (-46.0, -20.0, 0.0, 20.0, 44.0)
+    points, unknown = np.full((68, 2), 5.0), np.zeros(68)
+    views = tuple(
+        View(str(yaw), yaw, np.zeros((9, 9, 3), np.uint8)).with_findings(
+            Face(1.0, points, unknown, yaw, 0.0, 0.0), Person.absent()
+        )
+        for yaw in yaws
+    )
+    masks = (Mask(np.full((9, 9), 128, np.uint8), True),) * 5
+    noise = Sights.of(Capture(views), masks, 1.0).noise.reshape(5, 68)
+    assert np.allclose(noise[[0, 4]], 3 * noise[1:3])
+    few = Sights.of(Capture(views[:4]), masks[:4], 1.0).noise.reshape(4, 68)
+    assert np.array_equal(few[0], few[1])
 
 
 def test_the_pull_of_the_true_cameras_is_weak(bust: Turntable, fit: LandmarkFit) -> None:
