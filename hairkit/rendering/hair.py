@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.arrays import Float32Array
+from hairkit.arrays import Float32Array, Int64Array
 from hairkit.rendering.context import Renderer
 from hairkit.rendering.gl_camera import DepthRange, set_camera, set_uniforms
 from hairkit.types.camera import Camera
@@ -19,6 +20,7 @@ from hairkit.types.strands import Strands
 
 _RESTART = 0xFFFFFFFF
 _GROUP = 64  # local_size_x of ribbon_shape.glsl
+_MOST_POINTS = 65535 * _GROUP  # groups of a dispatch, which every OpenGL allows
 _SHAPED_BYTES = 32  # a RibbonPoint of ribbon.glsl
 _GOLDEN_STEP = 0.6180339887498949
 """Inverse of the golden ratio: multiples of it, modulo 1, fill the unit interval evenly."""
@@ -26,7 +28,7 @@ _GOLDEN_STEP = 0.6180339887498949
 
 @dataclass(frozen=True)
 class RibbonBuffers:
-    """Strands on the GPU."""
+    """A part of the strands on the GPU."""
 
     points: moderngl.Buffer
     shaped: moderngl.Buffer
@@ -37,27 +39,39 @@ class RibbonBuffers:
 @contextlib.contextmanager
 def ribbons(
     gl: Renderer, strands: Strands, width: float | npt.ArrayLike
-) -> Iterator[RibbonBuffers | None]:
-    """Upload strands for a block, `width` metres wide (a number or (P,)).
+) -> Iterator[tuple[RibbonBuffers, ...]]:
+    """Upload strands for a block, `width` metres wide (a number or (P,)), in as many parts as
+    OpenGL takes."""
+    records = _point_records(strands, width)
+    with contextlib.ExitStack() as kept:
+        yield tuple(
+            _upload(gl, records[strands.offsets[first] : strands.offsets[end]], counts, kept)
+            for first, end in pairwise(_cuts(strands))
+            if len(counts := strands.counts[first:end])
+        )
 
-    Yields `None`, which draws nothing, if there are no strands.
-    """
-    if not len(strands):
-        yield None
-        return
-    points = gl.context.buffer(_point_records(strands, width))
-    shaped = gl.context.buffer(reserve=_SHAPED_BYTES * len(strands.points))
-    indices = gl.context.buffer(_strip_indices(strands))
-    try:
-        yield RibbonBuffers(points, shaped, indices, len(strands.points))
-    finally:
-        for buffer in (points, shaped, indices):
-            buffer.release()
+
+def _cuts(strands: Strands) -> Int64Array:
+    """Return where strands are cut into parts of `_MOST_POINTS` points at most."""
+    total, longest = len(strands.points), int(strands.counts.max(initial=0))
+    parts = 1 + total // max(_MOST_POINTS - longest, 1)
+    return np.searchsorted(strands.offsets, np.linspace(0, total, parts + 1))
+
+
+def _upload(
+    gl: Renderer, records: Float32Array, counts: Int64Array, kept: contextlib.ExitStack
+) -> RibbonBuffers:
+    points = gl.context.buffer(records)
+    shaped = gl.context.buffer(reserve=_SHAPED_BYTES * len(records))
+    indices = gl.context.buffer(_strip_indices(counts))
+    for buffer in (points, shaped, indices):
+        kept.callback(buffer.release)
+    return RibbonBuffers(points, shaped, indices, len(records))
 
 
 def draw_ribbons(
     gl: Renderer,
-    buffers: RibbonBuffers | None,
+    parts: Sequence[RibbonBuffers],
     program: moderngl.Program,
     camera: Camera,
     depth: DepthRange,
@@ -71,19 +85,19 @@ def draw_ribbons(
     The program's vertex shader includes `ribbon_vertex.glsl`. Shaping is a pass of its own because
     compute shaders run on all cores of a software renderer, vertex shaders on one.
     """
-    if buffers is None:
-        return
     shape = gl.compute(shader)
-    for part in (shape, program):
-        set_camera(part, camera, depth)
-        set_uniforms(part, u_min_width_px=min_width_px, u_count=buffers.count, **uniforms)
-    buffers.points.bind_to_storage_buffer(0)
-    buffers.shaped.bind_to_storage_buffer(1)
-    shape.run(-(-buffers.count // _GROUP))
-    gl.context.memory_barrier()
-    array = gl.context.vertex_array(program, [], index_buffer=buffers.indices)
-    array.render(moderngl.TRIANGLE_STRIP)
-    array.release()
+    for each in (shape, program):
+        set_camera(each, camera, depth)
+        set_uniforms(each, u_min_width_px=min_width_px, **uniforms)
+    for part in parts:
+        set_uniforms(shape, u_count=part.count)
+        part.points.bind_to_storage_buffer(0)
+        part.shaped.bind_to_storage_buffer(1)
+        shape.run(-(-part.count // _GROUP))
+        gl.context.memory_barrier()
+        array = gl.context.vertex_array(program, [], index_buffer=part.indices)
+        array.render(moderngl.TRIANGLE_STRIP)
+        array.release()
 
 
 def strand_numbers(count: int) -> Float32Array:
@@ -108,10 +122,10 @@ def _point_records(strands: Strands, width: float | npt.ArrayLike) -> Float32Arr
     return records
 
 
-def _strip_indices(strands: Strands) -> npt.NDArray[np.uint32]:
-    total, count = len(strands.points), len(strands)
+def _strip_indices(counts: Int64Array) -> npt.NDArray[np.uint32]:
+    total, count = int(counts.sum()), len(counts)
     vertices = np.arange(2 * total, dtype=np.uint32)
-    places = np.arange(2 * total) + np.repeat(np.arange(count), 2 * strands.counts)
+    places = np.arange(2 * total) + np.repeat(np.arange(count), 2 * counts)
     indices = np.full(2 * total + count, _RESTART, np.uint32)
     indices[places] = vertices
     return indices

@@ -13,7 +13,7 @@ import numpy as np
 from hairkit.arrays import Float32Array, UInt8Array
 from hairkit.errors import InputError
 from hairkit.rendering.context import Renderer, renderer
-from hairkit.rendering.framebuffer import SUPERSAMPLE, average_samples, supersample_camera, target
+from hairkit.rendering.framebuffer import average_samples, supersample_camera, target
 from hairkit.rendering.gl_camera import DepthRange
 from hairkit.rendering.hair import RibbonBuffers, draw_ribbons, ribbons
 from hairkit.rendering.head import Solid, bust_solid, head_solid, upload_maps
@@ -33,6 +33,8 @@ SHOWN_HAIRS = 60_000
 """Fewer strands are drawn wider, so that they cover the head as this many would."""
 WIDEST = 4.0
 """Largest factor of that widening."""
+SAMPLES = 3
+"""Along each edge of a pixel: with two, a hair that stands alone is a row of dots."""
 HALF_STEP = 127
 """Half of 255: added before the division by 255, so that it rounds to the nearest level."""
 
@@ -49,7 +51,7 @@ def draw(
     background: UInt8Array | None = None,
     solids: Sequence[Solid] = (),
     bust: bool = False,
-    supersample: int = SUPERSAMPLE,
+    supersample: int = SAMPLES,
     skin: SkinLook | None = None,
 ) -> UInt8Array:
     """Return a picture (H, W, 3) uint8 RGB of hair on a head, antialiased.
@@ -104,7 +106,7 @@ def draw_views(
     backgrounds: Sequence[UInt8Array] | None = None,
     solids: Sequence[Solid] = (),
     bust: bool = False,
-    supersample: int = SUPERSAMPLE,
+    supersample: int = SAMPLES,
     skin: SkinLook | None = None,
 ) -> list[UInt8Array]:
     """Return one picture for each camera, as `draw` does, but upload hair and head once."""
@@ -194,7 +196,7 @@ def _shoot(
     gl: Renderer,
     shot: _Shot,
     strands: Strands,
-    buffers: RibbonBuffers | None,
+    buffers: Sequence[RibbonBuffers],
     look: dict[str, Any],
     solids: Sequence[Solid],
     maps: Sequence[Mapping[str, moderngl.Texture]],

@@ -115,6 +115,19 @@ def test_coverage_is_the_area_that_is_drawn() -> None:
         assert cover.sum() == pytest.approx(length * width * camera.focal, rel=0.05)
 
 
+def test_strands_beyond_what_a_dispatch_takes_are_drawn_in_parts(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Many parts, single strands among them, give the picture of one."""
+    generator = np.random.default_rng(3)
+    counts = generator.integers(2, 20, 40)
+    lines = [generator.uniform(-0.08, 0.08, (2, 3)) for _ in counts]
+    hair = Strands.from_list([np.linspace(*ends, n) for ends, n in zip(lines, counts, strict=True)])
+    whole = draw_layers(hair, None, camera_at(30.0))[0]
+    monkeypatch.setattr("hairkit.rendering.hair._MOST_POINTS", 30)
+    assert np.array_equal(draw_layers(hair, None, camera_at(30.0))[0], whole)
+
+
 def test_layers_share_out_a_pixel() -> None:
     """Hair and solids together never cover more than a pixel, and the ball is as big as it is."""
     head = ball_head(24)
