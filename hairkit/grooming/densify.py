@@ -48,6 +48,9 @@ BEYOND_FARTHEST = 1.05
 """Half the distance at which weights fall to 0, in distances of the farthest guide mixed."""
 MOST_STRETCH = 1.3
 """Factor by which a mixture, shorter than its guides, is lengthened at most."""
+RIM_NEIGHBOURS, RIM_FROM, RIM_AT = 16, 0.25, 0.6
+"""Guides around a root, and how far their middle lies off it, in shares of their mean distance,
+where the rim of the hair begins and at it."""
 MOST_WISPS = 6000
 """Wisps that hair is gathered in at most."""
 MAX_POINTS = 128
@@ -93,16 +96,19 @@ def densify(
     bundle = _Bundle.of(even)
     positions, uv = _new_roots(guides, bundle, count - len(strands), roots, seed, generator)
     mix = _choose_guides(bundle, positions)
-    course, nearest = positions[:, None] + _mix_courses(bundle, mix), mix.guides[:, 0]
-    stray = np.zeros(len(positions), bool)
+    course, nearest = _mix_courses(bundle, mix), mix.guides[:, 0]
+    thinned = np.ones(len(positions), np.float32)
     if locks is None:
-        new = course + bundle.waves[nearest]
+        new = positions[:, None] + course + bundle.waves[nearest]
     else:
         curly = material.curl_radius > 0  # else the waves are bends, which must stay as they are
         stray = generator.random(len(course)) < locks.stray
         locks = locks if curly else replace(locks, curl=0)
-        new = _lay_in_locks(bundle, course, locks, stray, generator)
-    return _join(even, new, nearest, stray, uv, material)
+        rim = locks.rim * _nearness_to_rim(bundle, positions)
+        course *= (1 - rim * generator.random(len(rim)) ** 2)[:, None, None].astype(np.float32)
+        new = _lay_in_locks(bundle, positions[:, None] + course, locks, stray, generator)
+        thinned = np.where(stray, STRAY_WIDTH, 1 - rim)
+    return _join(even, new, nearest, thinned, uv, material)
 
 
 def roots_between(guides: Groom, count: int, seed: int = 0) -> Roots:
@@ -211,6 +217,16 @@ def _choose_guides(bundle: _Bundle, positions: Float32Array) -> _Mix:
     return _Mix(near, weight.astype(np.float32))
 
 
+def _nearness_to_rim(bundle: _Bundle, positions: Float32Array) -> Float32Array:
+    """Return (N,) 1 at the hairline, where all guides lie to one side, 0 inside of it."""
+    if len(bundle.roots) < RIM_NEIGHBOURS:
+        return np.zeros(len(positions), np.float32)
+    distance, near = _neighbours(bundle, positions, RIM_NEIGHBOURS)
+    aside = np.linalg.norm(bundle.roots[near].mean(axis=1) - positions, axis=1)
+    share = aside / np.maximum(distance.mean(axis=1), NEAR_ENOUGH)
+    return np.asarray(np.clip((share - RIM_FROM) / (RIM_AT - RIM_FROM), 0, 1), np.float32)
+
+
 def _agreement(bundle: _Bundle, near: Int64Array) -> npt.NDArray[np.bool_]:
     """Return (N, K) whether each guide agrees in course with the first, nearest one."""
     stops = np.linspace(0, bundle.points - 1, CHORDS + 1).astype(int)
@@ -293,7 +309,7 @@ def _join(
     even: Strands,
     new: Float32Array,
     nearest: Int64Array,
-    stray: BoolArray,
+    thinned: Float32Array,
     uv: Float32Array | None,
     material: HairMaterial,
 ) -> Strands:
@@ -302,7 +318,7 @@ def _join(
     keep_uv = uv is not None and even.root_uv is not None
     group = None if even.group is None else np.concatenate([even.group, even.group[nearest]])
     widths = strand_widths(total, np.linspace(0, 1, m), material.width)
-    widths[old:][stray] *= STRAY_WIDTH
+    widths[old:] *= thinned[:, None]
     return Strands(
         np.concatenate([even.points, new.reshape(-1, 3)]),
         np.arange(total + 1) * m,

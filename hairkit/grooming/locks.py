@@ -46,6 +46,7 @@ class LockOptions:
     stray: float = option(0.05, low=0, high=1, doc="Share of hairs that keep out of locks.")
     scatter: float = option(0.002, low=0, high=0.05, unit="m", doc="RMS wander of a tip.")
     uneven: float = option(0.3, low=0, high=0.9, doc="Share of its length that a strand may lack.")
+    rim: float = option(0.5, low=0, high=1, doc="Share that hairs at the hairline are thinner.")
     curl: float = option(0.4, low=0, high=1, doc="Share by which waves differ from hair to hair.")
 
 

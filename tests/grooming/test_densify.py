@@ -127,6 +127,23 @@ def test_widths_come_from_the_material() -> None:
     assert np.allclose(widths[:, -1] / widths[:, 0], 1 - TAPER)
 
 
+def test_hair_thins_and_shortens_at_the_hairline() -> None:
+    """Hair at the edge of the guides' roots is thinner and shorter than inside of it."""
+    groom = bristle_groom()
+    count, wanted = len(groom.strands), len(groom.strands) + 3000
+    calm = LockOptions(stray=0, scatter=0, uneven=0, to_lock=0, to_wisp=0)
+    thin, even = (densify(groom, wanted, locks=replace(calm, rim=r)) for r in (0.5, 0.0))
+    assert np.array_equal(thin.roots, even.roots)
+    up = even.roots[count:, 1]  # bristles cover the upper half of a ball
+    rim, inside = up < np.quantile(up, 0.05), up > np.quantile(up, 0.3)
+    assert thin.widths is not None
+    assert even.widths is not None
+    widths = (thin.widths / even.widths).reshape(wanted, -1)[:, 0]
+    for share in (widths[count:], (thin.lengths() / even.lengths())[count:]):
+        assert share[rim].mean() < 0.88
+        assert share[inside].mean() > 0.95
+
+
 def test_hair_gathers_in_locks_that_guides_alone_place() -> None:
     """Towards the tips hair of any seed is nearer to some wisp, roots stay, and tips are uneven."""
     guides, roots = curtain(), np.random.default_rng(0).uniform(-0.05, 0.05, (600, 3))
@@ -173,7 +190,7 @@ def test_locks_keep_a_parting() -> None:
             for k, x in enumerate(sides)
         ]
     )
-    hair = densify(guides, 400, locks=LockOptions(stray=0, scatter=0))
+    hair = densify(guides, 400, locks=LockOptions(stray=0, scatter=0, rim=0))
     assert (np.sign(hair.tips[:, 0]) == np.sign((hair.tips - hair.roots)[:, 0])).all()
     assert np.abs((hair.tips - hair.roots)[:, 0]).min() > 0.06
 
