@@ -280,10 +280,16 @@ class TurnFit:
         return coherence(self.outlines, *cameras, middle, SOFT_MIN * noise)
 
     def residual_px(self, fit: Fit) -> float:
-        """Return the root mean square misfit of landmarks and missed contour rays, pixels."""
+        """Return the root mean square misfit of landmarks and missed contour rays, pixels.
+
+        Landmarks with more than the median noise count less, as they do in the fit.
+        """
         cameras = self.cameras(fit.vector)
         value, _ = self._coherence(fit.vector, cameras, self.noise)
         misfit = value[value < 0]
+        weight = np.ones(len(misfit))
         if self.landmarks is not None:
+            noise = self.landmarks.sights.noise
             misfit = np.append(misfit, self.landmarks.misfit(fit.offset, cameras))
-        return float(np.sqrt(np.mean(misfit**2))) if len(misfit) else 0.0
+            weight = np.append(weight, np.minimum(1, np.median(noise) / noise) ** 2)
+        return float(np.sqrt(np.average(misfit**2, weights=weight))) if len(misfit) else 0.0

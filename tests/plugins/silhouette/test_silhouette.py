@@ -146,6 +146,29 @@ def test_options_say_how_sure_landmarks_of_files_are(bust: Turntable) -> None:
     assert residual(2.0, loose) == residual(2.0, tight)
 
 
+def test_landmarks_that_are_not_trusted_hardly_count_as_misfit(bust: Turntable) -> None:
+    """A face whose landmarks are off, and said to be unsure, leaves the residual small."""
+    faces = [i for i, view in enumerate(bust.capture.views) if view.landmarks is not None]
+
+    def residual(noise: float) -> float:
+        views = list(bust.capture.views)
+        for i in faces:
+            marks, wrong = views[i].landmarks, i == faces[-1]
+            assert marks is not None
+            marks = marks + wrong * np.random.default_rng(0).normal(0, 15, (68, 2))
+            each = np.full(68, noise if wrong else 1.0)
+            face = Face(1.0, marks, each, views[i].azimuth_deg, 0.0, 0.0)
+            views[i] = replace(views[i], face=face, landmarks=marks)
+        capture = replace(bust.capture, views=tuple(views))
+        found = estimate_scene(
+            capture, bust.masks, bust.head, None, replace(FAST, iterations=3, carries=0)
+        )
+        assert found.residual_px is not None
+        return float(found.residual_px)
+
+    assert residual(60.0) < 3 < residual(1.0)
+
+
 def test_the_model_can_be_named() -> None:
     """An option and the capture's flag decide on the camera model."""
     table = turntable(np.random.default_rng(2), stray=0.0)
