@@ -230,7 +230,7 @@ def _progressive_roots(
             tried = last
         now = int(np.searchsorted(number, wanted))
         found = take_free(point[:now], apart[:now], radius, taken, found)
-    return _places(area, number[taken], shift)
+    return even_places(area, number[taken], shift)
 
 
 def _scalp_area(head: Head, reach: Reach | None) -> Float64Array:
@@ -271,7 +271,7 @@ def _candidates(
     `whole` (F,) are the faces that lie within the reach.
     """
     number = np.arange(first, last)
-    face, weight = _places(area, number, shift)
+    face, weight = even_places(area, number, shift)
     on_scalp = (head.scalp[head.faces[face]] * weight).sum(axis=1) > 0.5
     number, face = number[on_scalp], face[on_scalp]
     point = evaluate(head, face, weight[on_scalp])
@@ -282,7 +282,7 @@ def _candidates(
     return number[kept], point[kept]
 
 
-def _places(
+def even_places(
     area: Float64Array, number: Int64Array, shift: npt.NDArray[np.uint64]
 ) -> tuple[Int32Array, Float64Array]:
     """Return the faces (N,), weights (N, 3) at numbers (N,) of an even sequence on areas (F,)."""

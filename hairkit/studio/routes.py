@@ -291,7 +291,8 @@ class Routes:
             return Response(read_bytes(path), media_type="image/png")
 
     async def _edits(self, request: Request) -> Response:
-        return JSONResponse({"strokes": self._studio.project.edits.values()})
+        strokes = {"strokes": self._studio.project.edits.values()}
+        return JSONResponse(strokes | await self._studio.editor.call("brushes", PHOTO_S, {}))
 
     async def _edit(self, request: Request) -> Response:
         """Keep the strokes over the hair: all of them, so that undoing one is leaving it out."""

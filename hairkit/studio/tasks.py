@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ import numpy as np
 from hairkit.api import export_for
 from hairkit.arrays import Float32Array, Float64Array, Int32Array, UInt8Array
 from hairkit.errors import HairkitError
+from hairkit.grooming.brushes import BRUSHES
 from hairkit.grooming.densify import roots_between
 from hairkit.grooming.engine_files import ENGINES
 from hairkit.head_model.scalp import roots_at
@@ -33,7 +34,7 @@ from hairkit.pipeline.reconstruct import reconstruct
 from hairkit.pipeline.run_record import RECORD, read_record
 from hairkit.pipeline.take_capture import take_with_choices
 from hairkit.pipeline.work_folder import LastRun, digest_of
-from hairkit.stages import EDITED, HULL, TRACK
+from hairkit.stages import EDITED, UNEDITED
 from hairkit.storage import read_bytes, write_bytes
 from hairkit.studio.clean_photo import clean_photo
 from hairkit.studio.feedback import judge_photo
@@ -49,7 +50,7 @@ from hairkit.studio.photo_tasks import (
     manager,
     prepare_photo,
 )
-from hairkit.types.edits import read_edits
+from hairkit.types.edits import GROUPS, read_edits
 from hairkit.types.groom import Groom
 from hairkit.types.head import Roots
 
@@ -153,13 +154,10 @@ def draft_groom(request: dict[str, Any], tell: Tell) -> Any:
 def edit_groom(request: dict[str, Any], tell: Tell) -> Any:
     """Write the `packet` of the last run's groom with the strokes that lie over it now."""
     folder = Path(request["folder"])
-    groom, last = Groom.load(folder / "result" / "groom.npz"), LastRun(folder / "result" / "work")
-    strands, hull, edits = last.latest(TRACK), last.latest(HULL), read_edits(folder / EDITS)
-    if edits:
-        recipe = load_recipe("default")
-        strands = recipe.ask(manager(), EDITED, strands=strands, hull=hull, edits=edits)
-    strands = replace(groom.strands, points=strands.points, offsets=strands.offsets)
-    _hair_packet(replace(groom, strands=strands), request)
+    groom = LastRun(folder / "result" / "work").latest(UNEDITED)
+    if edits := read_edits(folder / EDITS):
+        groom = load_recipe("default").ask(manager(), EDITED, groom=groom, edits=edits)
+    _hair_packet(groom, request)
     return {}
 
 
@@ -182,6 +180,11 @@ def list_formats(request: dict[str, Any], tell: Tell) -> Any:
     found = [(name, manager().info(name).format) for name in manager().names("export_groom")]
     plugins = [[name, format_.suffixes[0]] for name, format_ in found if format_ and format_.there]
     return {"formats": [*([_FOR + engine, f"-{engine}.zip"] for engine in ENGINES), *plugins]}
+
+
+def list_brushes(request: dict[str, Any], tell: Tell) -> Any:
+    """Return the names of the brushes, and of the groups of hair that they act on."""
+    return {"brushes": [*BRUSHES], "groups": [*GROUPS]}
 
 
 def draw_guides(request: dict[str, Any], tell: Tell) -> Any:
@@ -230,6 +233,7 @@ TASKS: dict[str, Callable[[dict[str, Any], Tell], Any]] = {
     "export": export_groom,
     "edit": edit_groom,
     "formats": list_formats,
+    "brushes": list_brushes,
     "guides": draw_guides,
     "pose": describe_pose,
 }

@@ -13,11 +13,14 @@ from hairkit.arrays import Float32Array, freeze
 from hairkit.errors import DataError, FormatError, InputError
 from hairkit.options import make_options, option
 from hairkit.storage import Stored, read_bytes
+from hairkit.types.strands import PLANTED
 
 MOST_BYTES = 2**24
 """Of a file of edits: some thousand strokes."""
 MOST_STROKES, MOST_POINTS = 1000, 10_000
 """Of a head, and of the path of one stroke."""
+GROUPS = ("hair", *PLANTED)
+"""Hair of the head, and what brushes plant on the face."""
 
 
 @dataclass(frozen=True)
@@ -31,6 +34,9 @@ class Brush:
     )
     pitch: float = option(
         0.03, low=0.002, high=0.5, unit="m", doc="Length of one turn of what it curls."
+    )
+    group: str = option(
+        GROUPS[0], choices=GROUPS, doc="The hair that it acts on: of the head, or planted."
     )
     mirror: bool = option(False, doc="Do the same on the other side of the head.")
 

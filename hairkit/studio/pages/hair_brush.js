@@ -1,10 +1,6 @@
 // Brushes over the hair: the strokes of the project, their settings, undo and redo.
 import { get, make, say, send } from "./api.js";
 
-const BRUSHES = {
-  comb: "Comb", part: "Part", puff: "Puff up", smooth: "Smooth", curl: "Curl", cut: "Cut",
-  lengthen: "Lengthen",
-};
 const FINEST_M = 0.002; // between places of a path
 const KEPT = "undone strokes"; // in the storage of the tab, so that a reload loses none
 
@@ -12,18 +8,23 @@ export class HairBrush {
   constructor() {
     this.path = null; // places of the brush while it is down, metres
     this.strokes = [];
-    const choose = ([name, words]) => make("option", { value: name }, words);
     this.choice = make("select", { "aria-label": "Brush" },
-      make("option", { value: "" }, "No brush"), ...Object.entries(BRUSHES).map(choose));
+      make("option", { value: "" }, "No brush"));
+    this.group = make("select", { "aria-label": "Hair that the brush acts on" });
     this.size = make("input", {
-      type: "range", min: "1", max: "8", step: "0.5", value: "3",
+      type: "range", min: "0.2", max: "8", step: "0.2", value: "3",
       "aria-label": "Radius of the brush in centimetres",
+    });
+    this.amount = make("input", {
+      type: "number", min: "0", max: "1", step: "any", placeholder: "usual",
+      "aria-label": "Amount: metres, or a share",
     });
     this.mirror = make("input", { type: "checkbox", "aria-label": "Both sides" });
     this.undo = make("button", { type: "button", onclick: () => this.back() }, "Undo");
     this.redo = make("button", { type: "button", onclick: () => this.forth() }, "Redo");
     this.controls = [
-      this.choice, make("label", {}, "Size", this.size),
+      this.choice, this.group, make("label", {}, "Size", this.size),
+      make("label", {}, "Amount", this.amount),
       make("label", {}, "Both sides", this.mirror), this.undo, this.redo,
     ];
     this.load();
@@ -31,10 +32,17 @@ export class HairBrush {
 
   get name() { return this.choice.value; }
 
+  get onSkin() { return this.group.value !== "hair"; }
+
   get radius() { return Number(this.size.value) / 100; }
 
   async load() {
-    try { this.strokes = (await get("/api/edits")).strokes; } catch (error) { say(error.message); }
+    try {
+      const { strokes, brushes, groups } = await get("/api/edits");
+      this.strokes = strokes;
+      this.choice.append(...brushes.map(option));
+      this.group.append(...groups.map(option));
+    } catch (error) { say(error.message); }
     this.show();
   }
 
@@ -51,13 +59,19 @@ export class HairBrush {
     return way ? { last, way } : null;
   }
 
+  // The stroke as far as it is drawn.
+  stroke() {
+    const { name: brush, radius, path, group: { value: group }, mirror: { checked: mirror } } = this;
+    const amount = this.amount.value && this.amount.checkValidity()
+      ? { amount: Number(this.amount.value) } : {};
+    return { brush, radius, mirror, group, path, ...amount };
+  }
+
   drop() { this.path = null; }
 
   lift() {
     if (!this.path) return;
-    const stroke = {
-      brush: this.name, radius: this.radius, mirror: this.mirror.checked, path: this.path,
-    };
+    const stroke = this.stroke();
     this.path = null;
     keep([]);
     this.send([...this.strokes, stroke]);
@@ -87,6 +101,10 @@ export class HairBrush {
       say(error.message);
     }
   }
+}
+
+function option(name) {
+  return make("option", { value: name }, name[0].toUpperCase() + name.slice(1));
 }
 
 function undone() { return JSON.parse(sessionStorage.getItem(KEPT) ?? "[]"); }

@@ -192,10 +192,11 @@ class HairControls {
     if (drawn && name === "comb") this.motion.comb(drawn.last, drawn.way, radius);
   }
 
-  // Returns the place on the foremost hair under a point of the canvas, in pixels. A stroke goes
-  // along the hair: no farther in depth than across, and at its own depth where there is none.
+  // Returns the place on the foremost hair, or skin, under a point of the canvas, in pixels. A
+  // stroke goes along it: no farther in depth than across, at its own depth where there is none.
   under(x, y) {
-    const { motion: { now }, canvas: { clientWidth: w, clientHeight: h } } = this;
+    const { canvas: { clientWidth: w, clientHeight: h } } = this;
+    const now = this.brush.onSkin ? this.view.packet.arrays.head_points.data : this.motion.now;
     const { matrix, eye, right, up, back } = this.view.camera(), slope = Math.tan(0.25);
     const ray = right.map((v, k) =>
       (2 * x / w - 1) * slope * (w / h) * v + (1 - 2 * y / h) * slope * up[k] - back[k]);
