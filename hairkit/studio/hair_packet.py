@@ -35,7 +35,7 @@ MAGIC = PACKET.encode()
 HAIRS, POINTS = 9000, 16
 """Strands drawn and points of each: what a phone draws sixty times a second."""
 MOST_GUIDES = 700
-"""Guides that are simulated in the page."""
+"""Guides of the head's hair that are simulated in the page."""
 SKIN_EDGE, SKIN_QUALITY = 1024, 85
 """Longest edge in pixels, and JPEG quality, of the picture of the skin: about 100 kB."""
 LIGHT_CELL = 0.006
@@ -52,8 +52,9 @@ def write_packet(groom: Groom, path: Path, roots: Roots | None = None) -> None:
 def packet_of(groom: Groom, roots: Roots | None = None) -> bytes:
     """Return the packet of a groom; `roots` are those of the hair between its guides, if known."""
     strands = groom.strands
-    step = max(1, -(-len(strands) // MOST_GUIDES))
-    guides = strands.select(np.arange(len(strands)) % step == 0).resampled(POINTS)
+    step = max(1, -(-int((~strands.planted).sum()) // MOST_GUIDES))
+    moved = strands.planted | (np.arange(len(strands)) % step == 0)
+    guides = strands.select(moved).resampled(POINTS)
     hair = densify(groom, HAIRS, roots=roots).resampled(POINTS)
     shape = (-1, POINTS, 3)
     joined = Strands.from_list([*guides.points.reshape(shape), *hair.points.reshape(shape)])
@@ -69,6 +70,7 @@ def packet_of(groom: Groom, roots: Roots | None = None) -> bytes:
         "head_eyes": _on_eyes(head),
         **({} if bust is None else _mesh("bust", bust)),
         "guides": guides.points.astype(np.float32).reshape(shape),
+        "stiff": guides.planted.astype(np.uint8),
         "hair": hair.points.astype(np.float32).reshape(shape),
         "carriers": followed.guides[len(guides) :].astype(np.float32),
         "weights": followed.weights[len(guides) :],

@@ -28,6 +28,7 @@ SEEN, CONTINUED = 0, 1
 of the head only. Photos from all around make one group."""
 PLANTED = {"brows": 101, "lashes": 102, "beard": 103}
 """Groups of hair that brushes plant on the face, by name; all others are hair of the head."""
+GROUP_NAMES = {number: name for name, number in PLANTED.items()}
 
 
 @dataclass(frozen=True, eq=False)

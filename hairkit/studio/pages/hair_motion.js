@@ -22,6 +22,7 @@ export class HairMotion {
     this.rest = Float32Array.from(guides.data); // brushes change it
     this.now = Float32Array.from(guides.data);
     this.before = Float32Array.from(guides.data);
+    this.stiff = packet.arrays.stiff.data; // 1 for brows, lashes and beard: they stay
     this.capsules = capsules.data;
     this.wind = [0, 0, 0];
     this.turn = 0; // radians about the vertical axis, of the head
@@ -77,6 +78,7 @@ export class HairMotion {
     const swing = this.turn - this.turnBefore;
     this.turnBefore = this.turn;
     for (let g = 0; g < this.count; g += 1) {
+      if (this.stiff[g]) continue;
       this.drift(g, swing);
       if (this.held?.guide === g) this.hold(g);
       this.constrain(g);
