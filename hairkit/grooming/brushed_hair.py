@@ -168,6 +168,10 @@ class Hair:
         """Return all strands of a group, those under the brush as they were before."""
         return self if self.around is None else self.around.take(self.around.in_group(group))
 
+    def copy(self) -> Hair:
+        """Return hair that brushes can change while this stays."""
+        return replace(self, points=self.points.copy())
+
     def take(self, index: npt.NDArray[Any]) -> Hair:
         """Return some strands, by numbers or a mask, around which are all of these."""
         some = {name: getattr(self, name)[index] for name in _EACH}
@@ -189,7 +193,7 @@ class Hair:
 
     def move(self, shift: Float64Array) -> None:
         """Move points (S, M, 3); the segments keep their lengths and take the new directions."""
-        some = np.abs(shift).max(axis=(1, 2), initial=0) > UNMOVED
+        some = np.abs(shift).reshape(len(shift), -1).max(axis=1, initial=0) > UNMOVED
         points, lengths = self.points[some], self.lengths[some]
         ways = np.diff(points + shift[some], axis=1)
         size = np.linalg.norm(ways, axis=2, keepdims=True)
@@ -241,7 +245,8 @@ class Hair:
             pushed = push_out_of_head(inside, self.room.grid, self.room.distance, CLEARANCE)
             shift = np.zeros_like(self.points)
             shift[self.moved] = (pushed.points - inside.points).reshape(points.shape)
-            self.move(shift)
+            self.moved[:] = False
+            self.move(shift)  # marks those that were inside
 
     def outwards(self, places: Float64Array) -> Float64Array:
         """Return the directions (N, 3) off the head at places (N, 3)."""

@@ -163,8 +163,7 @@ def brush_hair(hair: Hair, edit: Edit, brushes: Mapping[str, Kind] = BRUSHES) ->
     strokes = strokes_of(edit, kind.amount)
     if kind.on_skin:
         strokes = [each._replace(path=hair.room.on_skin(each.path)) for each in strokes]
-    index = np.flatnonzero(hair.in_group(setting.group))
-    index = index[_may_touch(hair.points[index], strokes)]
+    index = np.flatnonzero(_may_touch(hair.points, strokes) & hair.in_group(setting.group))
     index = index[_touched(hair.points[index], strokes) > 0]
     some = hair.take(index)
     kind.apply(some, strokes)
@@ -175,12 +174,14 @@ def brush_hair(hair: Hair, edit: Edit, brushes: Mapping[str, Kind] = BRUSHES) ->
 
 def _may_touch(points: Float64Array, strokes: list[Stroke]) -> BoolArray:
     """Return which strands (S, M, 3) come into a box about the strokes."""
-    found = np.zeros(len(points), bool)
+    found = np.full(points.shape[:2], not len(strokes[0].path))
     for path, radius, *_ in strokes:
-        low, high = path.min(0, initial=np.inf) - radius, path.max(0, initial=-np.inf) + radius
-        within = (points >= low) & (points <= high)
-        found |= within.all(axis=2).any(axis=1) if len(path) else True
-    return found
+        if len(path):
+            low, high = path.min(axis=0) - radius, path.max(axis=0) + radius
+            found |= np.all(
+                [(points[..., k] > low[k]) & (points[..., k] < high[k]) for k in range(3)], 0
+            )
+    return np.asarray(found.any(axis=1))
 
 
 def _touched(points: Float64Array, strokes: list[Stroke]) -> Float64Array:

@@ -15,6 +15,7 @@ from hairkit.arrays import BoolArray, Float64Array, Int64Array, unit_vectors
 from hairkit.grooming.brushed_hair import MIRROR, Hair, Stroke
 from hairkit.grooming.densify import NEIGHBOURS, densify
 from hairkit.head_model.scalp import evaluate, even_places, roots_at
+from hairkit.head_model.spread_vertices import spread_points
 from hairkit.types.head import Head, Roots
 from hairkit.types.strands import PLANTED, Strands
 
@@ -73,7 +74,7 @@ def thin(hair: Hair, strokes: list[Stroke]) -> None:
         share = stroke.amount * stroke.reach(hair.points[:, 0])[0]
         under = np.flatnonzero(share > 0)
         rank = np.empty(len(under))  # the same for every amount: more removes these and others
-        rank[_far_first(hair.points[under, 0])] = (np.arange(len(under)) + 0.5) / len(under)
+        rank[_in_order(hair.points[under, 0])] = (np.arange(len(under)) + 0.5) / len(under)
         gone = np.zeros(len(hair.points), bool)
         gone[under] = rank > 1 - share[under]
         hair.remove(gone)
@@ -83,6 +84,14 @@ def thin(hair: Hair, strokes: list[Stroke]) -> None:
         for each in strokes:
             density *= 1 - np.clip(each.amount * each.reach(places)[0], 0, 1)
         hair.density = density.astype(np.float32)
+
+
+def _in_order(roots: Float64Array) -> Int64Array:
+    """Return an even order (N,) of roots, whose middle comes late: it may become bald."""
+    if len(roots) > MOST:
+        return np.arange(len(roots))  # guides are in such an order
+    apart = ((roots - roots.mean(axis=0)) ** 2).sum(axis=1) if len(roots) else 0.0
+    return spread_points(roots, len(roots), apart)
 
 
 def _new_roots(others: Hair, stroke: Stroke) -> Roots:
@@ -102,22 +111,9 @@ def _new_roots(others: Hair, stroke: Stroke) -> Roots:
     if stroke.group not in USUAL:
         share = share * ((head.scalp[head.faces[face]] * weights).sum(axis=1) > 0.5)
     count = min(int(np.ceil(wanted * share.sum() / max(tried, 1))), MOST)
-    taken = _take_apart(places, np.sqrt(share), others.points[:, 0], count)
+    apart = cKDTree(others.points[:, 0]).query(places)[0] ** 2 if len(others.points) else 1.0
+    taken = spread_points(places, min(count, int((share > 0).sum())), apart, share)
     return roots_at(head, face[taken], weights[taken])
-
-
-def _take_apart(
-    places: Float64Array, scale: Float64Array, roots: Float64Array, count: int
-) -> Int64Array:
-    """Return the numbers of `count` places, each farthest from all roots before, by a scale."""
-    apart = np.full(len(places), 1.0)
-    if len(roots):
-        apart = cKDTree(roots).query(places)[0]
-    taken = np.zeros(min(count, int(np.count_nonzero(scale))), np.int64)
-    for k in range(len(taken)):
-        taken[k] = np.argmax(apart * scale)
-        apart = np.minimum(apart, np.linalg.norm(places - places[taken[k]], axis=1))
-    return taken
 
 
 def _usual_density(others: Hair, group: str) -> float:
@@ -190,20 +186,3 @@ def _own_way(head: Head, roots: Roots, group: str) -> Float64Array:
 
 def _vertices(head: Head) -> Float64Array:
     return head.vertices.astype(np.float64)
-
-
-def _far_first(points: Float64Array) -> Int64Array:
-    """Return an order (N,) of points in which each next one is farthest from all before it.
-
-    That of more than `MOST` points is their own: guides are in an order as even as this.
-    """
-    order = np.arange(len(points))
-    if not 0 < len(points) <= MOST:
-        return order
-    away = np.linalg.norm(points - points.mean(axis=0), axis=1)  # the middle may become bald
-    apart = np.full(len(points), np.inf)
-    for k in range(len(points)):
-        order[k] = np.argmax(away if k == 0 else apart)
-        apart = np.minimum(apart, np.linalg.norm(points - points[order[k]], axis=1))
-        apart[order[: k + 1]] = -1
-    return order

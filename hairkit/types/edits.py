@@ -12,7 +12,7 @@ import numpy as np
 from hairkit.arrays import Float32Array, freeze
 from hairkit.errors import DataError, FormatError, InputError
 from hairkit.options import make_options, option
-from hairkit.storage import Stored, read_bytes
+from hairkit.storage import Stored, read_bytes, write_text
 from hairkit.types.strands import PLANTED
 
 MOST_BYTES = 2**24
@@ -28,7 +28,7 @@ class Brush:
     """A brush and its settings; each has its own `amount`, see `hairkit.grooming.brushes`."""
 
     brush: str = option("comb", doc="Name of the brush.")
-    radius: float = option(0.03, low=0.001, high=0.3, unit="m", doc="Radius of its ball.")
+    radius: float = option(0.03, low=0.001, high=0.1, unit="m", doc="Radius of its ball.")
     amount: float | None = option(
         None, low=0, high=1, doc="How much it does; by default the brush's own."
     )
@@ -80,6 +80,10 @@ class Edits(Stored):
             {**asdict(edit.setting), "path": np.round(edit.path.astype(float), 5).tolist()}
             for edit in self.strokes
         ]
+
+    def write(self, path: Path) -> None:
+        """Write the file that `read_edits` reads."""
+        write_text(path, json.dumps({"strokes": self.values()}) + "\n")
 
 
 def read_edits(path: Path) -> Edits:
