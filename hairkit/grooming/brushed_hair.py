@@ -8,7 +8,7 @@ along it.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -51,9 +51,15 @@ class HeadRoom(NamedTuple):
     """(F',) numbers of the head's faces that are skin, not eyes."""
 
     @classmethod
-    @lru_cache(maxsize=2)
     def around(cls, head: Head) -> HeadRoom:
-        """Return the room around a head."""
+        """Return the room around a head; that of the last head is kept, whatever its density."""
+        if id(head.vertices) not in _ROOMS:
+            _ROOMS.clear()
+            _ROOMS[id(head.vertices)] = cls._measured(head)
+        return _ROOMS[id(head.vertices)]
+
+    @classmethod
+    def _measured(cls, head: Head) -> HeadRoom:
         low, high = head.vertices.min(axis=0), head.vertices.max(axis=0)
         grid = VoxelGrid.around(low - MARGIN, high + MARGIN, CELL)
         eyes = () if head.eye_vertices is None else head.eye_vertices
@@ -69,6 +75,10 @@ class HeadRoom(NamedTuple):
     def on_skin(self, places: Float64Array) -> Float64Array:
         """Return the places (N, 3) of the skin that are nearest to others."""
         return evaluate(self.head, *self.bind(places)) if len(places) else places
+
+
+_ROOMS: dict[int, HeadRoom] = {}
+"""By the vertices, which they hold."""
 
 
 class Stroke(NamedTuple):

@@ -140,14 +140,7 @@ BRUSHES = {
 
 
 def edit_groom(groom: Groom, edits: Edits, brushes: Mapping[str, Kind] = BRUSHES) -> Groom:
-    """Return a groom after strokes; those that reach no hair are named in the log.
-
-    Raises `InputError` for a brush that there is not.
-    """
-    for number, edit in enumerate(edits.strokes, start=1):
-        name = edit.setting.brush
-        if name not in brushes:
-            raise InputError(f"stroke {number}: {unknown_name('brush', name, brushes)}")
+    """Return a groom after strokes; those that reach no hair are named in the log."""
     if not edits:
         return groom
     hair = Hair.of(groom)
@@ -158,8 +151,14 @@ def edit_groom(groom: Groom, edits: Edits, brushes: Mapping[str, Kind] = BRUSHES
 
 
 def brush_hair(hair: Hair, edit: Edit, brushes: Mapping[str, Kind] = BRUSHES) -> bool:
-    """Do a stroke on hair; return whether it reached any."""
-    kind, setting = brushes[edit.setting.brush], edit.setting
+    """Do a stroke on hair; return whether it reached any.
+
+    Raises `InputError` for a brush that there is not.
+    """
+    setting = edit.setting
+    if setting.brush not in brushes:
+        raise InputError(unknown_name("brush", setting.brush, brushes))
+    kind = brushes[setting.brush]
     strokes = strokes_of(edit, kind.amount)
     if kind.on_skin:
         strokes = [each._replace(path=hair.room.on_skin(each.path)) for each in strokes]

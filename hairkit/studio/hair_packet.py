@@ -20,6 +20,7 @@ from hairkit.arrays import UInt8Array
 from hairkit.grooming.densify import densify
 from hairkit.grooming.guide_weights import closest_guides
 from hairkit.grooming.locks import TAPER
+from hairkit.grooming.prepare_export import select_strands
 from hairkit.imaging.picture_file import encode_picture
 from hairkit.rendering.context import shader_source
 from hairkit.rendering.head import Solid, bust_solid, head_solid
@@ -51,10 +52,7 @@ def write_packet(groom: Groom, path: Path, roots: Roots | None = None) -> None:
 
 def packet_of(groom: Groom, roots: Roots | None = None) -> bytes:
     """Return the packet of a groom; `roots` are those of the hair between its guides, if known."""
-    strands = groom.strands
-    step = max(1, -(-int((~strands.planted).sum()) // MOST_GUIDES))
-    moved = strands.planted | (np.arange(len(strands)) % step == 0)
-    guides = strands.select(moved).resampled(POINTS)
+    strands, guides = groom.strands, page_guides(groom).strands
     hair = densify(groom, HAIRS, roots=roots).resampled(POINTS)
     shape = (-1, POINTS, 3)
     joined = Strands.from_list([*guides.points.reshape(shape), *hair.points.reshape(shape)])
@@ -87,6 +85,14 @@ def packet_of(groom: Groom, roots: Roots | None = None) -> bytes:
         "strands": len(strands),
     }
     return pack(arrays, facts)
+
+
+def page_guides(groom: Groom) -> Groom:
+    """Return the guides of a groom that move in the page, of `POINTS` points."""
+    strands = groom.strands
+    step = max(1, -(-int((~strands.planted).sum()) // MOST_GUIDES))
+    some = select_strands(groom, strands.planted | (np.arange(len(strands)) % step == 0))
+    return replace(some, strands=some.strands.resampled(POINTS))
 
 
 def pack(arrays: dict[str, npt.NDArray[Any]], facts: dict[str, Any]) -> bytes:

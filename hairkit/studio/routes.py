@@ -91,6 +91,7 @@ class Routes:
             ("/api/head", "POST", self._nudge),
             ("/api/edits", "GET", self._edits),
             ("/api/edits", "PUT", self._edit),
+            ("/api/edits/stroke", "POST", self._stroke),
             ("/api/choices", "GET", self._choices),
             ("/api/choices", "PUT", self._choose),
             ("/api/build", "POST", self._build),
@@ -301,6 +302,12 @@ class Routes:
             self._studio.project.edit(edits)
         self._studio.changed(touched=[EDITS])
         return JSONResponse({})
+
+    async def _stroke(self, request: Request) -> Response:
+        """Say what a stroke that is being drawn does to the page's guides."""
+        values = {"stroke": (await receive_json(request)).get("stroke")}
+        values["folder"] = str(self._studio.project.folder)
+        return JSONResponse(await self._studio.editor.call("stroke", PHOTO_S, values))
 
     async def _choices(self, request: Request) -> Response:
         folder = {"folder": str(self._studio.project.folder)}

@@ -6,9 +6,11 @@ their own (`task_child`), so that a picture that crashes a decoder ends one task
 
 from __future__ import annotations
 
+import json
 import zipfile
 from collections.abc import Callable
 from dataclasses import asdict
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +20,8 @@ import numpy as np
 from hairkit.api import export_for
 from hairkit.arrays import Float32Array, Float64Array, Int32Array, UInt8Array
 from hairkit.errors import HairkitError
-from hairkit.grooming.brushes import BRUSHES
+from hairkit.grooming.brushed_hair import Hair
+from hairkit.grooming.brushes import BRUSHES, brush_hair
 from hairkit.grooming.densify import roots_between
 from hairkit.grooming.engine_files import ENGINES
 from hairkit.head_model.scalp import roots_at
@@ -33,7 +36,7 @@ from hairkit.pipeline.recipe import load_recipe
 from hairkit.pipeline.reconstruct import reconstruct
 from hairkit.pipeline.run_record import RECORD, read_record
 from hairkit.pipeline.take_capture import take_with_choices
-from hairkit.pipeline.work_folder import LastRun, digest_of
+from hairkit.pipeline.work_folder import LastRun, digest_of, stage_file
 from hairkit.stages import EDITED, UNEDITED
 from hairkit.storage import read_bytes, write_bytes
 from hairkit.studio.clean_photo import clean_photo
@@ -50,7 +53,7 @@ from hairkit.studio.photo_tasks import (
     manager,
     prepare_photo,
 )
-from hairkit.types.edits import GROUPS, read_edits
+from hairkit.types.edits import GROUPS, Edits, read_edits
 from hairkit.types.groom import Groom
 from hairkit.types.head import Roots
 
@@ -154,11 +157,47 @@ def draft_groom(request: dict[str, Any], tell: Tell) -> Any:
 def edit_groom(request: dict[str, Any], tell: Tell) -> Any:
     """Write the `packet` of the last run's groom with the strokes that lie over it now."""
     folder = Path(request["folder"])
-    groom = LastRun(folder / "result" / "work").latest(UNEDITED)
-    if edits := read_edits(folder / EDITS):
-        groom = load_recipe("default").ask(manager(), EDITED, groom=groom, edits=edits)
-    _hair_packet(groom, request)
+    _hair_packet(_edited(folder, read_edits(folder / EDITS)), request)
     return {}
+
+
+def show_stroke(request: dict[str, Any], tell: Tell) -> Any:
+    """Return the page's guides that a `stroke` under way moves: numbers, and points (N, 16, 3)."""
+    folder = Path(request["folder"])
+    before = _page_hair(folder, _made(folder), json.dumps(read_edits(folder / EDITS).values()))
+    hair = before.copy()
+    brush_hair(hair, Edits.of([request["stroke"]], "stroke").strokes[0])
+    if len(hair.points) != len(before.points):  # strands that come and go need a whole preview
+        return {"guides": [], "points": []}
+    moved = np.flatnonzero((hair.points != before.points).any(axis=(1, 2)))
+    return {"guides": moved.tolist(), "points": np.round(hair.points[moved], 5).tolist()}
+
+
+@lru_cache(maxsize=1)
+def _page_hair(folder: Path, made: int, edits: str) -> Hair:
+    """Return the page's guides after strokes as JSON."""
+    from hairkit.studio.hair_packet import page_guides
+
+    return Hair.of(page_guides(_edited(folder, Edits.of(json.loads(edits), EDITS))))
+
+
+def _edited(folder: Path, edits: Edits) -> Groom:
+    """Return the groom of the last run after strokes."""
+    groom = _unedited(folder, _made(folder))
+    return (
+        load_recipe("default").ask(manager(), EDITED, groom=groom, edits=edits) if edits else groom
+    )
+
+
+@lru_cache(maxsize=1)
+def _unedited(folder: Path, made: int) -> Groom:
+    return LastRun(folder / "result" / "work").latest(UNEDITED)
+
+
+def _made(folder: Path) -> int:
+    """Return when the last run made its groom, so that what is kept of it is known to be old."""
+    file = stage_file(folder / "result" / "work", UNEDITED)
+    return file.stat().st_mtime_ns if file.is_file() else 0
 
 
 def export_groom(request: dict[str, Any], tell: Tell) -> Any:
@@ -232,6 +271,7 @@ TASKS: dict[str, Callable[[dict[str, Any], Tell], Any]] = {
     "draft": draft_groom,
     "export": export_groom,
     "edit": edit_groom,
+    "stroke": show_stroke,
     "formats": list_formats,
     "brushes": list_brushes,
     "guides": draw_guides,

@@ -226,6 +226,9 @@ def test_strokes_over_the_hair_are_kept(server: Any) -> None:
         assert answer.status == 422
         assert "edits" in answer.json["error"]
     assert server.ask("GET", "/api/edits").json["strokes"] == [kept]
+    early = server.ask("POST", "/api/edits/stroke", {"stroke": stroke})
+    assert early.status == 422
+    assert "run all stages first" in early.json["error"]
     assert read_capture_edits(server.folder) == [kept]
 
 

@@ -8,9 +8,9 @@ export class HairBrush {
   constructor() {
     this.path = null; // places of the brush while it is down, metres
     this.strokes = [];
-    this.choice = make("select", { "aria-label": "Brush" },
+    this.choice = make("select", { "aria-label": "Brush", onchange: prime },
       make("option", { value: "" }, "No brush"));
-    this.group = make("select", { "aria-label": "Hair that the brush acts on" });
+    this.group = make("select", { "aria-label": "Acts on" });
     this.size = make("input", {
       type: "range", min: "0.2", max: "8", step: "0.2", value: "3",
       "aria-label": "Radius of the brush in centimetres",
@@ -51,12 +51,24 @@ export class HairBrush {
     this.redo.disabled = !undone().length;
   }
 
-  // Goes on to a place; returns where it was before and the way from there, null if too near.
+  // Goes on to a place; returns whether it is far enough from the one before.
   draw(at) {
-    const last = this.path?.at(-1), way = last && at.map((v, k) => v - last[k]);
-    if (way && Math.hypot(...way) < FINEST_M) return null;
+    const last = this.path?.at(-1);
+    if (last && Math.hypot(...at.map((v, k) => v - last[k])) < FINEST_M) return false;
     this.path = [...this.path ?? [], at];
-    return way ? { last, way } : null;
+    return true;
+  }
+
+  // Shows what the stroke does so far, as the studio says; asks once at a time.
+  async preview(motion) {
+    this.more = Boolean(this.asked);
+    if (this.asked) return;
+    this.asked = this.stroke();
+    const { guides, points } = await send("POST", "/api/edits/stroke", { stroke: this.asked })
+      .catch(() => ({ guides: [], points: [] })); // the whole preview says what is wrong
+    this.asked = null;
+    if (this.path) motion.show(guides, points);
+    if (this.path && this.more) this.preview(motion);
   }
 
   // The stroke as far as it is drawn.
@@ -67,12 +79,16 @@ export class HairBrush {
     return { brush, radius, mirror, group, path, ...amount };
   }
 
-  drop() { this.path = null; }
+  drop(motion) {
+    this.path = null;
+    motion.show([], []);
+  }
 
-  lift() {
+  lift(motion) {
     if (!this.path) return;
     const stroke = this.stroke();
     this.path = null;
+    motion.shown.clear(); // what is shown stays until the whole preview comes
     keep([]);
     this.send([...this.strokes, stroke]);
   }
@@ -101,6 +117,11 @@ export class HairBrush {
       say(error.message);
     }
   }
+}
+
+// Lets the studio read the hair before the first stroke, by one that reaches none.
+function prime() {
+  send("POST", "/api/edits/stroke", { stroke: { path: [[9, 9, 9]] } }).catch(() => {});
 }
 
 function option(name) {

@@ -107,7 +107,7 @@ class HairControls {
 
   up(event) {
     this.pointers.delete(event.pointerId);
-    this.brush?.lift();
+    this.brush?.lift(this.motion);
     this.hold(null);
   }
 
@@ -122,7 +122,7 @@ class HairControls {
       ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1],
     }[event.key];
     const act = way ? () => this.arrow(...way) : {
-      p: () => this.press(), Escape: () => { this.brush?.drop(); this.hold(null); },
+      p: () => this.press(), Escape: () => { this.brush?.drop(this.motion); this.hold(null); },
       "+": () => this.zoom(0.9), "-": () => this.zoom(1.1),
       w: () => { this.wind.value = Number(this.wind.value) > 0 ? 0 : WIND; },
       s: () => { this.shaken = 0; },
@@ -169,7 +169,7 @@ class HairControls {
   // Puts the brush down in the middle, or lifts it; without one takes a strand, or lets it go.
   press() {
     const { clientWidth: w, clientHeight: h } = this.canvas;
-    if (this.brush?.path) this.brush.lift();
+    if (this.brush?.path) this.brush.lift(this.motion);
     else if (this.brush?.name) this.stroke(w / 2, 0.4 * h);
     else this.take();
   }
@@ -186,10 +186,8 @@ class HairControls {
     this.draw(last.map((value, k) => value + across * right[k] + upwards * up[k]));
   }
 
-  // Shows at once what a comb does; other brushes show when the studio has done the stroke.
   draw(at) {
-    const { name, radius } = this.brush, drawn = this.brush.draw(at);
-    if (drawn && name === "comb") this.motion.comb(drawn.last, drawn.way, radius);
+    if (this.brush.draw(at)) this.brush.preview(this.motion);
   }
 
   // Returns the place on the foremost hair, or skin, under a point of the canvas, in pixels. A
