@@ -1,7 +1,7 @@
 """The actions of the viewer, with their keys: mouse, panel and scripts use them too.
 
 >>> sorted(ACTIONS)[:3]
-['adjust', 'backdrop', 'colours']
+['adjust', 'backdrop', 'brush']
 """
 
 from __future__ import annotations
