@@ -91,7 +91,7 @@ class Stroke(NamedTuple):
     pitch: float
     group: str
 
-    def reach(self, points: Float64Array) -> tuple[Float64Array, Int64Array]:
+    def reach(self, points: npt.NDArray[np.floating]) -> tuple[Float64Array, Int64Array]:
         """Return how much (...) the stroke acts at points (..., 3), 0 to 1, and its place there."""
         if not len(self.path):
             return np.ones(points.shape[:-1]), np.zeros(points.shape[:-1], int)
@@ -203,7 +203,7 @@ class Hair:
 
     def move(self, shift: Float64Array) -> None:
         """Move points (S, M, 3); the segments keep their lengths and take the new directions."""
-        some = np.abs(shift).reshape(len(shift), -1).max(axis=1, initial=0) > UNMOVED
+        some = (np.abs(shift) > UNMOVED).any(axis=(1, 2))
         points, lengths = self.points[some], self.lengths[some]
         ways = np.diff(points + shift[some], axis=1)
         size = np.linalg.norm(ways, axis=2, keepdims=True)

@@ -114,28 +114,21 @@ def lengthen(hair: Hair, strokes: list[Stroke]) -> None:
 
 
 class Kind(NamedTuple):
-    """A brush."""
+    """A brush: a function that does a stroke and, where it is mirrored, the other one, both to the
+    hair as it was before; its usual amount; and whether its path is drawn on the skin below it,
+    since it acts about the roots."""
 
     apply: Callable[[Hair, list[Stroke]], None]
-    """Does a stroke and, where it is mirrored, the other one, both to the hair as it was before."""
     amount: float
-    """Its usual amount."""
     on_skin: bool = False
-    """True where it acts about the roots: its path is drawn on the skin below the brush."""
 
 
 BRUSHES = {
-    "comb": Kind(comb, 1.0),
-    "part": Kind(part, 0.03, on_skin=True),
-    "puff": Kind(puff, 0.01),
-    "smooth": Kind(smooth, 0.5),
-    "curl": Kind(curl, 0.006),
-    "cut": Kind(cut, 0.0),
-    "trim": Kind(trim, 0.03),
-    "lengthen": Kind(lengthen, 0.02),
-    "add": Kind(add, 1.0, on_skin=True),
-    "thin": Kind(thin, 0.5, on_skin=True),
-}
+    "comb": Kind(comb, 1.0), "part": Kind(part, 0.03, True), "puff": Kind(puff, 0.01),
+    "smooth": Kind(smooth, 0.5), "curl": Kind(curl, 0.006), "cut": Kind(cut, 0.0),
+    "trim": Kind(trim, 0.03), "lengthen": Kind(lengthen, 0.02),
+    "add": Kind(add, 1.0, True), "thin": Kind(thin, 0.5, True),
+}  # fmt: skip
 """Brushes by name."""
 
 
@@ -173,13 +166,10 @@ def brush_hair(hair: Hair, edit: Edit, brushes: Mapping[str, Kind] = BRUSHES) ->
 
 def _may_touch(points: Float64Array, strokes: list[Stroke]) -> BoolArray:
     """Return which strands (S, M, 3) come into a box about the strokes."""
-    found = np.full(points.shape[:2], not len(strokes[0].path))
-    for path, radius, *_ in strokes:
-        if len(path):
-            low, high = path.min(axis=0) - radius, path.max(axis=0) + radius
-            found |= np.all(
-                [(points[..., k] > low[k]) & (points[..., k] < high[k]) for k in range(3)], 0
-            )
+    found, axes = np.full(points.shape[:2], not len(strokes[0].path)), np.moveaxis(points, 2, 0)
+    for path, radius, *_ in strokes if len(strokes[0].path) else ():
+        low, high = path.min(axis=0) - radius, path.max(axis=0) + radius
+        found |= np.all([(lo < x) & (x < hi) for lo, x, hi in zip(low, axes, high, strict=True)], 0)
     return np.asarray(found.any(axis=1))
 
 

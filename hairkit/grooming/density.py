@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from hairkit.arrays import BoolArray, Float64Array, Int64Array, unit_vectors
+from hairkit.arrays import Float64Array, Int64Array, unit_vectors
 from hairkit.grooming.brushed_hair import MIRROR, Hair, Stroke
 from hairkit.grooming.densify import NEIGHBOURS, densify
 from hairkit.head_model.scalp import evaluate, even_places, roots_at
@@ -24,6 +24,8 @@ TRIED = 8
 MOST = 5000
 """Strands that a stroke adds at most, or takes in the order of their distances: all are compared
 with all."""
+FACE = 0.01
+"""Metres that the corners of a face lie beyond the brush at most."""
 SHORTER = 0.3
 """Share by which planted strands are shorter than the longest of them at most."""
 GOLDEN = (np.sqrt(5) - 1) / 2
@@ -39,14 +41,16 @@ class Planted(NamedTuple):
     """Of the longest strands, metres."""
     lift_deg: tuple[float, float]
     """Angle from the skin at the root and at the tip."""
+    way: tuple[float, float, float]
+    """Its own direction on the subject's left."""
     follow: float
     """Share of the stroke's way in the strands' direction; the rest is the group's own."""
 
 
 USUAL = {
-    "brows": Planted(250_000.0, 0.009, (30.0, 5.0), 0.7),
-    "lashes": Planted(300_000.0, 0.010, (75.0, 15.0), 0.25),
-    "beard": Planted(120_000.0, 0.015, (45.0, 10.0), 0.6),
+    "brows": Planted(250_000.0, 0.009, (30.0, 5.0), (1, 0, 0), 0.7),
+    "lashes": Planted(300_000.0, 0.010, (75.0, 15.0), (0, 1, 0), 0.25),
+    "beard": Planted(120_000.0, 0.015, (45.0, 10.0), (0, -1, 0), 0.6),
 }
 """Lengths: brows and upper lashes of adults reach 1 cm; a beard of two weeks."""
 
@@ -64,7 +68,7 @@ def add(hair: Hair, strokes: list[Stroke]) -> None:
             grow = _grown if stroke.group in USUAL else _mixed
             hair.plant(grow(others, stroke, roots), roots, PLANTED.get(stroke.group, 0))
     if strokes[0].group == "hair" and hair.density is not None:
-        more = sum(each.amount * each.reach(_vertices(hair.room.head))[0] for each in strokes)
+        more = sum(each.amount * each.reach(hair.room.head.vertices)[0] for each in strokes)
         hair.density = np.clip(hair.density + more, 0, 1).astype(np.float32)
 
 
@@ -79,19 +83,17 @@ def thin(hair: Hair, strokes: list[Stroke]) -> None:
         gone[under] = rank > 1 - share[under]
         hair.remove(gone)
     if strokes[0].group == "hair":
-        places = _vertices(hair.room.head)
-        density = np.ones(len(places)) if hair.density is None else hair.density.astype(np.float64)
-        for each in strokes:
-            density *= 1 - np.clip(each.amount * each.reach(places)[0], 0, 1)
-        hair.density = density.astype(np.float32)
+        places = hair.room.head.vertices
+        left = [1 - np.clip(each.amount * each.reach(places)[0], 0, 1) for each in strokes]
+        full = np.ones(len(places)) if hair.density is None else hair.density
+        hair.density = (full * np.prod(left, axis=0)).astype(np.float32)
 
 
 def _in_order(roots: Float64Array) -> Int64Array:
     """Return an even order (N,) of roots, whose middle comes late: it may become bald."""
-    if len(roots) > MOST:
+    if not 0 < len(roots) <= MOST:
         return np.arange(len(roots))  # guides are in such an order
-    apart = ((roots - roots.mean(axis=0)) ** 2).sum(axis=1) if len(roots) else 0.0
-    return spread_points(roots, len(roots), apart)
+    return spread_points(roots, len(roots), ((roots - roots.mean(axis=0)) ** 2).sum(axis=1))
 
 
 def _new_roots(others: Hair, stroke: Stroke) -> Roots:
@@ -100,15 +102,19 @@ def _new_roots(others: Hair, stroke: Stroke) -> Roots:
     Of places tried in an even sequence the one is taken that is farthest from all roots, in the
     spacing that is wanted there. Both sides of the head try mirrored places.
     """
-    head, side = others.room.head, np.where(stroke.path[:, :1].sum() < 0, MIRROR, 1.0)
-    area = _areas(head) * _comes_near(head, stroke._replace(path=stroke.path * side))
-    wanted = stroke.amount * _usual_density(others, stroke.group) * area.sum()
-    tried = int(np.clip(TRIED * np.ceil(wanted), 1, TRIED * MOST)) if wanted > 0 else 0
+    head, usual = others.room.head, USUAL.get(stroke.group)
+    side = np.where(stroke.path[:, :1].sum() < 0, MIRROR, 1.0)
+    wide = stroke._replace(path=stroke.path * side, radius=stroke.radius + FACE)
+    every, near = _areas(head), (wide.reach(head.vertices)[0][head.faces] > 0).any(axis=1)
+    scalp = every @ (head.scalp[head.faces].mean(axis=1) > 0.5)
+    area = every * near * (usual is None or len(stroke.path) > 0)  # no beard everywhere
+    wanted = stroke.amount * area.sum() * (usual.per_m2 if usual else len(others.points) / scalp)
+    tried = TRIED * min(int(np.ceil(wanted)), MOST)
     face, weights = even_places(area, np.arange(tried), np.zeros(3, np.uint64))
     face, weights = others.room.bind(evaluate(head, face, weights) * side)
     places = evaluate(head, face, weights)
     share = stroke.reach(places)[0]
-    if stroke.group not in USUAL:
+    if usual is None:
         share = share * ((head.scalp[head.faces[face]] * weights).sum(axis=1) > 0.5)
     count = min(int(np.ceil(wanted * share.sum() / max(tried, 1))), MOST)
     apart = cKDTree(others.points[:, 0]).query(places)[0] ** 2 if len(others.points) else 1.0
@@ -116,29 +122,10 @@ def _new_roots(others: Hair, stroke: Stroke) -> Roots:
     return roots_at(head, face[taken], weights[taken])
 
 
-def _usual_density(others: Hair, group: str) -> float:
-    """Return strands of a group on a square metre, for an amount of 1."""
-    if group in USUAL:
-        return USUAL[group].per_m2
-    head = others.room.head
-    scalp = _areas(head) @ (head.scalp[head.faces].mean(axis=1) > 0.5)
-    return len(others.points) / float(scalp)
-
-
 def _areas(head: Head) -> Float64Array:
     """Return (F,) the areas of the faces, square metres."""
-    a, b, c = _vertices(head)[head.faces.T]
+    a, b, c = head.vertices.astype(np.float64)[head.faces.T]
     return np.asarray(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1))
-
-
-def _comes_near(head: Head, stroke: Stroke) -> BoolArray:
-    """Return the faces (F,) that a stroke may reach."""
-    corners = _vertices(head)[head.faces]
-    middle = corners.mean(axis=1)
-    size = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
-    if not len(stroke.path):  # everywhere, on the scalp
-        return np.asarray(head.scalp[head.faces].max(axis=1) > 0.5) & (stroke.group not in USUAL)
-    return np.asarray(cKDTree(stroke.path).query(middle)[0] < stroke.radius + size)
 
 
 def _mixed(others: Hair, stroke: Stroke, roots: Roots) -> Float64Array:
@@ -159,7 +146,7 @@ def _grown(others: Hair, stroke: Stroke, roots: Roots) -> Float64Array:
     way = _own_way(others.room.head, roots, stroke.group)
     if len(stroke.path) > 1:
         drawn = np.gradient(stroke.path, axis=0)[stroke.reach(start)[1]]
-        way = usual.follow * unit_vectors(drawn) + (1 - usual.follow) * way
+        way = usual.follow * unit_vectors(drawn) + (1 - usual.follow) * unit_vectors(way)
     along = unit_vectors(way - (way * normal).sum(axis=1, keepdims=True) * normal)
     lift = np.radians(np.linspace(*usual.lift_deg, many - 1))[:, None]
     turned = np.cos(lift) * along[:, None] + np.sin(lift) * normal[:, None]
@@ -169,20 +156,8 @@ def _grown(others: Hair, stroke: Stroke, roots: Roots) -> Float64Array:
 
 
 def _own_way(head: Head, roots: Roots, group: str) -> Float64Array:
-    """Return the direction (N, 3) that hair of a group has by itself.
-
-    Brows go outwards, lashes away from the middle of their eye, a beard goes down.
-    """
-    way, places = np.zeros(roots.positions.shape), roots.positions
-    if group == "brows":
-        way[:, 0] = np.sign(places[:, 0])
-    elif group == "lashes" and (eyes := head.eye_centres()) is not None:
-        eye = eyes[cKDTree(eyes).query(places)[1]]
-        way[:, :2] = unit_vectors(places - eye)[:, :2]
-    else:
-        way[:, 1] = 1.0 if group == "lashes" else -1.0
-    return way
-
-
-def _vertices(head: Head) -> Float64Array:
-    return head.vertices.astype(np.float64)
+    """Return the direction (N, 3) that hair of a group has by itself, on either side."""
+    places, eyes = roots.positions.astype(np.float64), head.eye_centres()
+    if group == "lashes" and eyes is not None:  # away from the middle of their eye
+        return np.asarray((places - eyes[cKDTree(eyes).query(places)[1]]) * [1, 1, 0])
+    return np.array(USUAL[group].way) * np.where(places[:, :1] < 0, MIRROR, 1.0)
