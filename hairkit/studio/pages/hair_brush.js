@@ -73,10 +73,10 @@ export class HairBrush {
 
   // The stroke as far as it is drawn.
   stroke() {
-    const { name: brush, radius, path, group: { value: group }, mirror: { checked: mirror } } = this;
-    const amount = this.amount.value && this.amount.checkValidity()
-      ? { amount: Number(this.amount.value) } : {};
-    return { brush, radius, mirror, group, path, ...amount };
+    const { name: brush, radius, path, amount: { value, validity } } = this;
+    const [group, mirror] = [this.group.value, this.mirror.checked];
+    const amount = value && validity.valid ? Number(value) : null;
+    return { brush, radius, mirror, group, path, amount };
   }
 
   drop(motion) {
