@@ -142,9 +142,7 @@ class Hair:
         strands, many = groom.strands, self.points.shape[1]
         even = strands if (strands.counts == many).all() else strands.resampled(many)
         look, head = even.select(self.source), groom.head
-        same_face = self.triangle == groom.root_triangle[self.source]
-        same_place = (self.barycentric == groom.root_barycentric[self.source]).all(axis=1)
-        own = same_face & same_place  # not planted
+        own = (self.barycentric == groom.root_barycentric[self.source]).all(axis=1)  # not planted
         uv = look.root_uv
         if uv is not None:
             uv = np.where(own[:, None], uv, roots_at(head, self.triangle, self.barycentric).uv)
@@ -226,10 +224,6 @@ class Hair:
         self.points[some] = points[row, after - 1] * (1 - t) + points[row, after] * t
         del self.lengths
         self.moved |= some
-
-    def remove(self, some: BoolArray) -> None:
-        """Remove strands (S,)."""
-        self.kept &= ~some
 
     def plant(self, points: Float64Array, roots: Roots, group: int) -> None:
         """Add strands (N, M, 3) of a group, with the looks of those that grow nearest."""

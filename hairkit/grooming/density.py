@@ -79,9 +79,7 @@ def thin(hair: Hair, strokes: list[Stroke]) -> None:
         under = np.flatnonzero(share > 0)
         rank = np.empty(len(under))  # the same for every amount: more removes these and others
         rank[_in_order(hair.points[under, 0])] = (np.arange(len(under)) + 0.5) / len(under)
-        gone = np.zeros(len(hair.points), bool)
-        gone[under] = rank > 1 - share[under]
-        hair.remove(gone)
+        hair.kept[under] &= rank <= 1 - share[under]
     if strokes[0].group == "hair":
         places = hair.room.head.vertices
         left = [1 - np.clip(each.amount * each.reach(places)[0], 0, 1) for each in strokes]

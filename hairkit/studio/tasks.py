@@ -119,19 +119,13 @@ def build_groom(request: dict[str, Any], tell: Tell) -> Any:
     """Reconstruct the project in `folder` into its `result`, as `hairkit reconstruct` does."""
     out = Path(request["result"])
     capture, chosen = take_with_choices(request["folder"], "default", manager())
-    groom = reconstruct(
-        capture,
-        out,
-        chosen,
-        manager(),
-        guides=request["guides"],
-        progress=_Told(tell, Path(request["stop"])),
-    )
+    told = _Told(tell, Path(request["stop"]))
+    groom = reconstruct(capture, out, chosen, manager(), guides=request["guides"], progress=told)
     _hair_packet(groom, request)
-    health = read_record(out / RECORD).health
+    health, hair = read_record(out / RECORD).health, groom.strands.select(~groom.strands.planted)
     return {
-        "strands": len(groom.strands),
-        "length_cm": round(100 * float(groom.strands.lengths().mean()), 1),
+        "strands": len(hair),
+        "length_cm": round(100 * float(hair.lengths().mean()), 1),
         "health": [[figure.light, figure.line()] for figure in health],
         "pose": _matrix(capture.chosen.head).tolist(),
     }
