@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from hairkit.arrays import Float64Array, Int64Array, unit_vectors
 from hairkit.grooming.brushed_hair import MIRROR, Hair, Stroke
 from hairkit.grooming.densify import NEIGHBOURS, densify
-from hairkit.head_model.scalp import evaluate, even_places, roots_at
+from hairkit.head_model.scalp import evaluate, even_places, face_areas, roots_at
 from hairkit.head_model.spread_vertices import spread_points
 from hairkit.types.head import Head, Roots
 from hairkit.types.strands import PLANTED, Strands
@@ -103,7 +103,7 @@ def _new_roots(others: Hair, stroke: Stroke) -> Roots:
     head, usual = others.room.head, USUAL.get(stroke.group)
     side = np.where(stroke.path[:, :1].sum() < 0, MIRROR, 1.0)
     wide = stroke._replace(path=stroke.path * side, radius=stroke.radius + FACE)
-    every, near = _areas(head), (wide.reach(head.vertices)[0][head.faces] > 0).any(axis=1)
+    every, near = face_areas(head), (wide.reach(head.vertices)[0][head.faces] > 0).any(axis=1)
     scalp = every @ (head.scalp[head.faces].mean(axis=1) > 0.5)
     area = every * near * (usual is None or len(stroke.path) > 0)  # no beard everywhere
     wanted = stroke.amount * area.sum() * (usual.per_m2 if usual else len(others.points) / scalp)
@@ -118,12 +118,6 @@ def _new_roots(others: Hair, stroke: Stroke) -> Roots:
     apart = cKDTree(others.points[:, 0]).query(places)[0] ** 2 if len(others.points) else 1.0
     taken = spread_points(places, min(count, int((share > 0).sum())), apart, share)
     return roots_at(head, face[taken], weights[taken])
-
-
-def _areas(head: Head) -> Float64Array:
-    """Return (F,) the areas of the faces, square metres."""
-    a, b, c = head.vertices.astype(np.float64)[head.faces.T]
-    return np.asarray(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1))
 
 
 def _mixed(others: Hair, stroke: Stroke, roots: Roots) -> Float64Array:

@@ -233,12 +233,15 @@ def _progressive_roots(
     return even_places(area, number[taken], shift)
 
 
+def face_areas(head: Head) -> Float64Array:
+    """Return the areas (F,) of a head's faces, square metres."""
+    a, b, c = head.vertices.astype(np.float64)[head.faces.T]
+    return np.asarray(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1))
+
+
 def _scalp_area(head: Head, reach: Reach | None) -> Float64Array:
     """Return the area (F,) of each face, 0 of those that bear no hair."""
-    corners = head.vertices.astype(np.float64)[head.faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    bears = head.scalp[head.faces].max(axis=1) > 0.5
-    area: Float64Array = 0.5 * np.linalg.norm(normal, axis=1) * bears
+    area: Float64Array = face_areas(head) * (head.scalp[head.faces].max(axis=1) > 0.5)
     if reach is not None:
         area *= _covered_faces(head, area, reach, 1.0)
     if not area.sum() > 0:
