@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from hairkit.errors import DataError
-from hairkit.head_model.scalp import evaluate
 from hairkit.stages import OF_HOOK
 from hairkit.types.capture import Capture
 from hairkit.types.groom import Groom
@@ -164,6 +163,8 @@ def _words(grid: VoxelGrid) -> str:
 
 
 def _groom_has_hair_on_its_head(groom: Groom, call: Call) -> None:
+    from hairkit.head_model.scalp import evaluate  # not needed by most commands
+
     if not len(groom.strands):
         raise DataError("no strand is left, expected hair")
     if not np.array_equal(groom.head.faces, call.arguments["groom"].head.faces):
