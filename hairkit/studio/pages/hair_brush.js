@@ -8,7 +8,7 @@ export class HairBrush {
   constructor() {
     this.path = null; // places of the brush while it is down, metres
     this.strokes = [];
-    this.choice = make("select", { "aria-label": "Brush", onchange: prime },
+    this.choice = make("select", { "aria-label": "Brush", onchange: () => this.choose() },
       make("option", { value: "" }, "No brush"));
     this.group = make("select", { "aria-label": "Acts on" });
     this.size = make("input", {
@@ -22,11 +22,12 @@ export class HairBrush {
     this.mirror = make("input", { type: "checkbox", "aria-label": "Both sides" });
     this.undo = make("button", { type: "button", onclick: () => this.back() }, "Undo");
     this.redo = make("button", { type: "button", onclick: () => this.forth() }, "Redo");
-    this.controls = [
-      this.choice, this.group, make("label", {}, "Size", this.size),
-      make("label", {}, "Amount", this.amount),
-      make("label", {}, "Both sides", this.mirror), this.undo, this.redo,
+    this.settings = [ // of a brush: on a phone there is no room for them without one
+      this.group, make("label", {}, "Size", this.size), make("label", {}, "Amount", this.amount),
+      make("label", {}, "Both sides", this.mirror),
     ];
+    for (const setting of this.settings) setting.hidden = true;
+    this.controls = [this.choice, ...this.settings, this.undo, this.redo];
     this.load();
   }
 
@@ -35,6 +36,12 @@ export class HairBrush {
   get onSkin() { return this.group.value !== "hair"; }
 
   get radius() { return Number(this.size.value) / 100; }
+
+  // Lets the studio read the hair before the first stroke, by one that reaches none.
+  choose() {
+    for (const setting of this.settings) setting.hidden = !this.name;
+    send("POST", "/api/edits/stroke", { stroke: { path: [[9, 9, 9]] } }).catch(() => {});
+  }
 
   async load() {
     try {
@@ -117,11 +124,6 @@ export class HairBrush {
       say(error.message);
     }
   }
-}
-
-// Lets the studio read the hair before the first stroke, by one that reaches none.
-function prime() {
-  send("POST", "/api/edits/stroke", { stroke: { path: [[9, 9, 9]] } }).catch(() => {});
 }
 
 function option(name) {
