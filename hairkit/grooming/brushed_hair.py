@@ -242,6 +242,8 @@ class Hair:
     def outside(self) -> None:
         """Move strands that were moved out of the head; their lengths stay."""
         for _ in range(ROUNDS):
+            if not self.moved.any():
+                break
             points = self.points[self.moved]
             count, many = points.shape[:2]
             offsets = np.arange(count + 1) * many

@@ -88,8 +88,8 @@ class Brushing:
         """
         on_hair = self.setting.group == "hair"
         points = self.hair.points.reshape(-1, 3) if on_hair else self.before.head.vertices
-        if self._way:  # hair elsewhere is not looked at
-            points = points[(points - self._way[-1]) ** 2 @ np.ones(3) < ASIDE**2]
+        for axis, at in enumerate(self._way[-1] if self._way else ()):  # not at hair elsewhere
+            points = points[np.abs(points[:, axis] - at) < ASIDE]
         picked = nearest_point(camera, points.astype(np.float32), pixel)
         depth = None if picked is None else float(camera.depth(points[picked]))
         if self._way:
