@@ -15,6 +15,7 @@ import numpy as np
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.errors import InputError
 from hairkit.grooming.brushed_hair import Hair
+from hairkit.grooming.brushes import BRUSHES
 from hairkit.io.capture_reader import EDITS
 from hairkit.manager import Manager
 from hairkit.pipeline.open_groom import groom_path, load_groom
@@ -171,14 +172,15 @@ class Session:
             if now is not None:
                 self._retake(replace(opened, groom=now.groom))
         elif now is not None:
-            now.setting = replace(now.setting, brush=name, amount=None)
+            now.setting = replace(now.setting, brush=name, amount=BRUSHES[name].amount)
         else:
             last, photos = self.layers.last, Path(self.layers.capture or "")
             before = last.latest(UNEDITED) if last.has(UNEDITED) else opened.groom
             path = (
                 photos if self.layers.capture and photos.is_dir() else opened.path.parent
             ) / EDITS
-            self.brushing = Brushing(before, path, Brush(name), Hair.of(self.drawn))
+            first = Brush(name, amount=BRUSHES[name].amount)
+            self.brushing = Brushing(before, path, first, Hair.of(self.drawn))
             self.show_strokes()
 
     def show_strokes(self) -> None:

@@ -111,7 +111,7 @@ def test_keys_change_the_brush(session: Session) -> None:
         perform(session, "brush_option", {"name": name})
     assert session.brushing is not None
     now = session.brushing.setting
-    assert now == Brush("add", now.radius, group="brows", mirror=True)
+    assert now == Brush("add", now.radius, BRUSHES["add"].amount, group="brows", mirror=True)
     assert 0.033 < now.radius < 0.037
     assert "brush add, 3.5 cm on brows, both sides; 0 strokes" in session.brushing.told
     perform(session, "brush_option", {"name": "amount", "value": 0.25})
