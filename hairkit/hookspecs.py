@@ -146,8 +146,8 @@ def track(
 
 
 @hookspec(firstresult=True)
-def edit_strands(strands: Strands, hull: Hull, edits: Edits, options: Any) -> Strands | None:
-    """Do the strokes of an artist, in their order; strand s stays that of root s."""
+def edit_groom(groom: Groom, edits: Edits, options: Any) -> Groom | None:
+    """Do the strokes of an artist, in their order."""
 
 
 @hookspec(firstresult=True)

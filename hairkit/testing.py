@@ -94,7 +94,7 @@ def stage_arguments(stage: str, folder: Path | None = None) -> dict[str, Any]:
         "field": combed_field(hull.grid),
         "scalp_distance": measure_scalp_distance(scene.head, hull),
         "roots": scalp_roots(scene.head),
-        "strands": bristle_groom().strands,
+        "groom": bristle_groom(),
         "edits": Edits((Edit(np.eye(3, dtype=np.float32) * _HAIR, Brush("comb")),)),
     }
     kinds = get_type_hints(Evidence)

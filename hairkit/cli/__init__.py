@@ -9,6 +9,7 @@ Results go to stdout, progress and logs to stderr. Exit codes: 0 done, 1 a bug, 
 * `batch_table`: its table on a terminal
 * `convert`: read hair of one format, write another
 * `doctor`: check this machine
+* `edit`: brushes over a groom
 * `evaluate`: scores against the truth
 * `export`: write a groom for an engine
 * `format_table`: the table of file formats
@@ -68,6 +69,7 @@ VERBS = {
     "view": "show a groom in motion, in a window or by a script",
     "export": "write a groom in an engine's format",
     "convert": "read hair of one format, write another",
+    "edit": "comb, cut, curl, thin or fill up a groom by brushes",
     "wrap": "carry a groom to another head",
     "validate": "check a hair file for an engine",
     "simulate": "simulate a groom, its head shaken and in wind",

@@ -122,16 +122,16 @@ def _chosen(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _summary(out: Path, strands: Strands) -> dict[str, Any]:
-    """Return what is told of the files and the strands."""
+    """Return what is told of the files and the strands of the head's own hair."""
     from hairkit.pipeline.reconstruct import SHEET
 
-    sheet = out / SHEET
+    sheet, hair = out / SHEET, strands.select(~strands.planted)
     return {
         "groom": str(out / "groom.npz"),
         "scene": str(out / "scene.json"),
         "contact_sheet": str(sheet) if sheet.exists() else None,
-        "strands": len(strands),
-        "mean_length_m": round(float(strands.lengths().mean()), 4),
+        "strands": len(hair),
+        "mean_length_m": round(float(hair.lengths().mean()), 4),
     }
 
 

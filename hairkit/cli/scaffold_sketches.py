@@ -182,11 +182,11 @@ points = roots.positions[:, None] + along * roots.normals[:, None]
 offsets = np.arange(len(roots) + 1) * 10
 return Strands(points.reshape(-1, 3), offsets, root_uv=roots.uv)""",
     ),
-    "edit_strands": Sketch(
+    "edit_groom": Sketch(
         "Strokes of hairkit's brushes, and of one that lets hair sink.",
         (
             _NUMPY,
-            "from hairkit.grooming.brushes import BRUSHES, HeadRoom, brush_strands",
+            "from hairkit.grooming import brushes",
         ),
         'drop: float = option(0.01, low=0.0, high=1.0, doc="Of the brush sink.", unit="m")',
         """
@@ -196,8 +196,8 @@ def sink(hair, strokes):
         hair.move(-reach[..., None] * np.array([0.0, 1.0, 0.0]))
 
 
-brushes = BRUSHES | {"sink": (sink, options.drop)}
-return brush_strands(strands, edits, HeadRoom(hull.grid, hull.head_distance), brushes)[0]""",
+every = brushes.BRUSHES | {"sink": brushes.Kind(sink, options.drop)}
+return brushes.edit_groom(groom, edits, every)""",
     ),
     "make_simulator": Sketch(
         "Hair that goes rigidly with the head.",

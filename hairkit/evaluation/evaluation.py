@@ -46,6 +46,7 @@ from hairkit.evaluation.strand_statistics import (
 )
 from hairkit.evaluation.truth import Truth
 from hairkit.grooming.densify import densify
+from hairkit.grooming.prepare_export import select_strands
 from hairkit.parallel import one_blas_thread
 from hairkit.types.groom import Groom
 from hairkit.types.mask import HAIR, PERSON
@@ -167,6 +168,9 @@ def evaluate(
         When views do not pair up or no strand is long enough to score.
     """
     prediction = prediction.in_order_of(truth)
+    groom = prediction.groom  # brows, lashes and beard are no hair of the head
+    alone = select_strands(groom, ~groom.strands.planted)
+    prediction = dataclasses.replace(prediction, groom=alone)
     groom, similarity, cameras = _align(prediction, truth)
     samples = sample_strands(groom.strands, name="predicted")
     precision, recall = sample_hits(samples, truth.samples, surfaces=truth.surfaces, visible=True)

@@ -4,11 +4,13 @@ Make a groom of tracked or imported strands, thin it out or fill it up, and prep
 
 * `adopt_strands`: a groom from bare strands of a file
 * `assemble`: strands, head and photo colours put together as a groom
+* `brushed_hair`: hair under a brush, and strokes over it
 * `brushes`: strands combed, cut and curled by strokes over them
 * `cover_hair`: strands led through hair that no other reaches
 * `curve_sets`: curves of files as strands, with values of points and strands
 * `decimate`: guides chosen from full hair
 * `densify`: full hair interpolated between guides
+* `density`: guides added between others, hair planted on the face, and guides removed
 * `engine_files`: what an engine takes of a groom
 * `fringe`: strands that hang loose beside tied hair
 * `guide_weights`: the nearest guides of each hair, and hair that follows them

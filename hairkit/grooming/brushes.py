@@ -1,35 +1,27 @@
-"""Brushes: strands combed, cut and curled by strokes over them.
+"""Brushes: strands combed, cut, curled, thinned and planted by strokes over them.
 
-A strand is its root, the directions of its segments and their lengths. Comb, part, puff, smooth and
-curl change directions alone, so that lengths stay; cut, trim and lengthen change lengths alone;
-roots stay in all. As in other grooming tools a stroke acts in a ball about the brush, most in its
-middle. Strands that a stroke would move into the head glide along it.
+Comb, part, puff, smooth and curl change directions alone, so that lengths stay; cut, trim and
+lengthen change lengths alone; `hairkit.grooming.density` adds and removes strands; roots stay in
+all. As in other grooming tools a stroke acts in a ball about the brush, most in its middle.
 """
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from hairkit.arrays import Float32Array, Float64Array, Int64Array
+from hairkit.arrays import BoolArray, Float64Array
 from hairkit.errors import InputError
-from hairkit.field.growth_prior import gradient
-from hairkit.grooming.head_collision import push_out_of_head
-from hairkit.head_model.signed_distance import signed_distance
+from hairkit.grooming.brushed_hair import Hair, Stroke, falloff, strokes_of
+from hairkit.grooming.density import add, thin
 from hairkit.options import unknown_name
 from hairkit.types.edits import Edit, Edits
 from hairkit.types.groom import Groom
-from hairkit.types.strands import Strands
-from hairkit.types.volume import VoxelGrid
 
-STEP, MOST_STEPS = 0.25, 2000
-"""Distance, in radii, of the places along its path at which a brush acts, and how many at most."""
-CLEARANCE, ROUNDS = 0.001, 6
-"""Metres that hair keeps from the head, and times that it is moved out and set to its lengths."""
 SHORTEST = 0.002
 """Least length of what is left of a strand that is cut, metres."""
 RISE = 0.03
@@ -38,101 +30,7 @@ GOLDEN = (np.sqrt(5) - 1) / 2
 """Turns between the curls of one strand and the next, which so begin anywhere."""
 NEIGHBOURS = 8
 """Strands whose mean smoothing draws to."""
-CELL, MARGIN = 0.004, 0.02
-"""Edge of the cells of a head's distances, and the room around the head, metres."""
-UNMOVED = 1e-7
-"""Metres by which a strand must move to count as changed."""
-MIRROR = np.array([-1.0, 1.0, 1.0])
-
-
-class HeadRoom(NamedTuple):
-    """How far every place near the head is from it."""
-
-    grid: VoxelGrid
-    distance: Float32Array
-    """(X, Y, Z) metres, negative inside."""
-
-    @classmethod
-    def around(cls, groom: Groom) -> HeadRoom:
-        """Return the room around a groom's head."""
-        low, high = groom.head.vertices.min(axis=0), groom.head.vertices.max(axis=0)
-        grid = VoxelGrid.around(low - MARGIN, high + MARGIN, CELL)
-        return cls(grid, signed_distance(groom.head, grid))
-
-
-@dataclass(eq=False)
-class Hair:
-    """Strands of equal point counts under a brush."""
-
-    points: Float64Array
-    """(S, M, 3) metres, head frame."""
-    room: HeadRoom
-
-    def __post_init__(self) -> None:
-        self.lengths = np.linalg.norm(np.diff(self.points, axis=1), axis=2)
-        """(S, M - 1) of the segments, metres."""
-
-    @property
-    def arcs(self) -> Float64Array:
-        """(S, M) metres from the root."""
-        return np.concatenate([np.zeros((len(self.points), 1)), self.lengths.cumsum(axis=1)], 1)
-
-    def move(self, shift: Float64Array) -> None:
-        """Move points (S, M, 3); the segments keep their lengths and take the new directions."""
-        ways = np.diff(self.points + shift, axis=1)
-        size = np.linalg.norm(ways, axis=2, keepdims=True)
-        ways = np.where(size > 1e-12, ways / np.maximum(size, 1e-12), 0.0)
-        steps = (ways * self.lengths[..., None]).cumsum(axis=1)
-        self.points = np.concatenate([self.points[:, :1], self.points[:, :1] + steps], axis=1)
-
-    def scale(self, factor: Float64Array) -> None:
-        """Make strands (S,) longer along their last direction, or cut what is beyond, again even
-        in their points."""
-        points, arcs = self.points, self.arcs
-        share = np.linspace(0, 1, points.shape[1])
-        wanted = share * (factor * arcs[:, -1])[:, None]
-        after = np.clip((arcs[:, None] <= wanted[..., None]).sum(axis=2), 1, arcs.shape[1] - 1)
-        row = np.arange(len(points))[:, None]
-        start, end = arcs[row, after - 1], arcs[row, after]
-        t = ((wanted - start) / np.maximum(end - start, 1e-12))[..., None]
-        self.points = points[row, after - 1] * (1 - t) + points[row, after] * t
-        self.__post_init__()
-
-    def outside(self) -> None:
-        """Move all strands out of the head; their lengths stay."""
-        count, many = self.points.shape[:2]
-        offsets = np.arange(count + 1) * many
-        for _ in range(ROUNDS):
-            inside = Strands(self.points.reshape(-1, 3).astype(np.float32), offsets)
-            moved = push_out_of_head(inside, *self.room, CLEARANCE)
-            shift = (moved.points - inside.points).astype(np.float64)
-            self.move(shift.reshape(count, many, 3))
-
-    def outwards(self, places: Float64Array) -> Float64Array:
-        """Return the directions (N, 3) off the head at places (N, 3)."""
-        grid, distance = self.room
-        return gradient(grid, distance, places)
-
-
-class Stroke(NamedTuple):
-    """Where a brush goes, and how much it does there."""
-
-    path: Float64Array
-    """(N, 3) places `STEP` radii apart or less, in long paths more, metres; none: everywhere."""
-    radius: float
-    amount: float
-    pitch: float
-
-    def reach(self, points: Float64Array) -> tuple[Float64Array, Int64Array]:
-        """Return how much (...) the stroke acts at points (..., 3), 0 to 1, and its place there."""
-        if not len(self.path):
-            return np.ones(points.shape[:-1]), np.zeros(points.shape[:-1], int)
-        away, near = cKDTree(self.path).query(points)
-        return _falloff(away / self.radius), near
-
-
-Apply = Callable[[Hair, list[Stroke]], None]
-"""Does a stroke and, where it is mirrored, the other one, both to the hair as it was before."""
+_log = logging.getLogger(__name__)
 
 
 def comb(hair: Hair, strokes: list[Stroke]) -> None:
@@ -142,7 +40,7 @@ def comb(hair: Hair, strokes: list[Stroke]) -> None:
         for stroke in strokes:
             at, way = stroke.path[k], stroke.path[k + 1] - stroke.path[k]
             away = np.linalg.norm(hair.points - at, axis=2) / stroke.radius
-            shift += stroke.amount * _falloff(away)[..., None] * way
+            shift += stroke.amount * falloff(away)[..., None] * way
         hair.move(shift)
 
 
@@ -170,10 +68,11 @@ def puff(hair: Hair, strokes: list[Stroke]) -> None:
 
 def smooth(hair: Hair, strokes: list[Stroke]) -> None:
     """Draw strands to the mean shape of those around them; `amount` is the share of the way."""
-    count = min(NEIGHBOURS, len(hair.points))
-    near = cKDTree(hair.points[:, 0]).query(hair.points[:, 0], count)[1].reshape(-1, count)
-    shape = hair.points - hair.points[:, :1]
-    shape /= np.maximum(hair.arcs[:, -1:, None], 1e-9)
+    others = hair.others(strokes[0].group)
+    count = min(NEIGHBOURS, len(others.points))
+    near = cKDTree(others.points[:, 0]).query(hair.points[:, 0], count)[1].reshape(-1, count)
+    shape = others.points - others.points[:, :1]
+    shape /= np.maximum(others.arcs[:, -1:, None], 1e-9)
     mean = shape[near].mean(axis=1) * hair.arcs[:, -1:, None] + hair.points[:, :1]
     weight = sum(stroke.amount * stroke.reach(hair.points)[0] for stroke in strokes)
     hair.move(np.clip(weight, 0, 1)[..., None] * (mean - hair.points))
@@ -205,82 +104,78 @@ def trim(hair: Hair, strokes: list[Stroke]) -> None:
     """Cut strands that the brush touches to a length of `amount` metres."""
     length, most = hair.arcs[:, -1], max(strokes[0].amount, SHORTEST)
     shorter = np.minimum(most / np.maximum(length, 1e-12), 1.0)
-    hair.scale(np.where(_touched(hair, strokes) > 0, shorter, 1.0))
+    hair.scale(np.where(_touched(hair.points, strokes) > 0, shorter, 1.0))
 
 
 def lengthen(hair: Hair, strokes: list[Stroke]) -> None:
     """Make strands that the brush touches longer by `amount` metres."""
-    longer = strokes[0].amount * _touched(hair, strokes)
+    longer = strokes[0].amount * _touched(hair.points, strokes)
     hair.scale(1 + longer / np.maximum(hair.arcs[:, -1], 1e-12))
 
 
-BRUSHES: dict[str, tuple[Apply, float]] = {
-    "comb": (comb, 1.0), "part": (part, 0.03), "puff": (puff, 0.01), "smooth": (smooth, 0.5),
-    "curl": (curl, 0.006), "cut": (cut, 0.0), "trim": (trim, 0.03), "lengthen": (lengthen, 0.02),
+class Kind(NamedTuple):
+    """A brush: a function that does a stroke and, where it is mirrored, the other one, both to the
+    hair as it was before; its usual amount; and whether its path is drawn on the skin below it,
+    since it acts about the roots."""
+
+    apply: Callable[[Hair, list[Stroke]], None]
+    amount: float
+    on_skin: bool = False
+
+
+BRUSHES = {
+    "comb": Kind(comb, 1.0), "part": Kind(part, 0.03, True), "puff": Kind(puff, 0.01),
+    "smooth": Kind(smooth, 0.5), "curl": Kind(curl, 0.006), "cut": Kind(cut, 0.0),
+    "trim": Kind(trim, 0.03), "lengthen": Kind(lengthen, 0.02),
+    "add": Kind(add, 1.0, True), "thin": Kind(thin, 0.5, True),
 }  # fmt: skip
-"""Brushes by name, with their usual amounts."""
+"""Brushes by name."""
 
 
-def brush_strands(
-    strands: Strands, edits: Edits, room: HeadRoom, brushes: Mapping[str, tuple[Apply, float]]
-) -> tuple[Strands, tuple[bool, ...]]:
-    """Return strands after strokes, of equal point counts, and which strokes reached any hair.
+def edit_groom(groom: Groom, edits: Edits, brushes: Mapping[str, Kind] = BRUSHES) -> Groom:
+    """Return a groom after strokes; those that reach no hair are named in the log."""
+    if not edits:
+        return groom
+    hair = Hair.of(groom)
+    for number, edit in enumerate(edits.strokes, start=1):
+        if not brush_hair(hair, edit, brushes):
+            _log.warning("stroke %d (%s) reaches no hair; it is kept", number, edit.setting.brush)
+    return hair.onto(groom)
+
+
+def brush_hair(hair: Hair, edit: Edit, brushes: Mapping[str, Kind] = BRUSHES) -> bool:
+    """Do a stroke on hair; return whether it reached any.
 
     Raises `InputError` for a brush that there is not.
     """
-    for number, edit in enumerate(edits.strokes, start=1):
-        name = edit.setting.brush
-        if name not in brushes:
-            raise InputError(f"stroke {number}: {unknown_name('brush', name, brushes)}")
-    if not edits or not len(strands):
-        return strands, (False,) * len(edits.strokes)
-    most = max(int(strands.counts.max()), 2)
-    even = strands if (strands.counts == most).all() else strands.resampled(most)
-    hair = Hair(even.points.reshape(len(even), -1, 3).astype(np.float64), room)
-    reached = []
-    for edit in edits.strokes:
-        apply, usual = brushes[edit.setting.brush]
-        strokes = _strokes(edit, usual)
-        reached.append(bool(_touched(hair, strokes).any()))
-        if reached[-1]:
-            before = hair.points
-            apply(hair, strokes)
-            changed = np.abs(hair.points - before).max(axis=(1, 2)) > UNMOVED
-            some = Hair(hair.points[changed], room)
-            some.outside()
-            points = before.copy()
-            points[changed] = some.points
-            hair = Hair(points, room)
-    made = hair.points.reshape(-1, 3).astype(np.float32)
-    return replace(even, points=made), tuple(reached)
+    setting = edit.setting
+    if setting.brush not in brushes:
+        raise InputError(unknown_name("brush", setting.brush, brushes))
+    kind = brushes[setting.brush]
+    strokes = strokes_of(edit, kind.amount)
+    if kind.on_skin:
+        strokes = [each._replace(path=hair.room.on_skin(each.path)) for each in strokes]
+    index = np.flatnonzero(_may_touch(hair.points, strokes) & hair.in_group(setting.group))
+    index = index[_touched(hair.points[index], strokes) > 0]
+    some = hair.take(index)
+    kind.apply(some, strokes)
+    some.outside()
+    hair.put(index, some)
+    return len(some.points) > 0
 
 
-def edit_groom(groom: Groom, edits: Edits) -> Groom:
-    """Return a groom after strokes; raises `InputError` for a brush that there is not."""
-    room = HeadRoom.around(groom)
-    return replace(groom, strands=brush_strands(groom.strands, edits, room, BRUSHES)[0])
+def _may_touch(points: Float64Array, strokes: list[Stroke]) -> BoolArray:
+    """Return which strands (S, M, 3) come into a box about the strokes."""
+    found, axes = np.full(points.shape[:2], not len(strokes[0].path)), np.moveaxis(points, 2, 0)
+    for path, radius, *_ in strokes if len(strokes[0].path) else ():
+        low, high = path.min(axis=0) - radius, path.max(axis=0) + radius
+        found |= np.all([(lo < x) & (x < hi) for lo, x, hi in zip(low, axes, high, strict=True)], 0)
+    return np.asarray(found.any(axis=1))
 
 
-def _strokes(edit: Edit, usual: float) -> list[Stroke]:
-    """Return a stroke along an edit's path and, where it is mirrored, along the other one."""
-    setting, path = edit.setting, edit.path.astype(np.float64)
-    if len(path) > 1:
-        way = np.concatenate([[0], np.linalg.norm(np.diff(path, axis=0), axis=1).cumsum()])
-        count = int(np.clip(np.ceil(way[-1] / (STEP * setting.radius)), 1, MOST_STEPS)) + 1
-        path = np.stack([np.interp(np.linspace(0, way[-1], count), way, x) for x in path.T], 1)
-    amount = usual if setting.amount is None else setting.amount
-    sides = [path, path * MIRROR] if setting.mirror and len(path) else [path]
-    return [Stroke(side, setting.radius, amount, setting.pitch) for side in sides]
-
-
-def _touched(hair: Hair, strokes: list[Stroke]) -> Float64Array:
-    """Return how much (S,) strokes reach of strands, at the most."""
-    return np.asarray(np.max([stroke.reach(hair.points)[0].max(axis=1) for stroke in strokes], 0))
-
-
-def _falloff(away: Float64Array) -> Float64Array:
-    """Return what a brush does at distances in radii: 1 in its middle, 0 at its edge."""
-    return np.clip(1 - away**2, 0, 1) ** 2
+def _touched(points: Float64Array, strokes: list[Stroke]) -> Float64Array:
+    """Return how much (S,) strokes reach of strands (S, M, 3), at the most."""
+    return np.asarray(np.max([each.reach(points)[0].max(axis=1) for each in strokes], axis=0))
 
 
 def _rise(hair: Hair) -> Float64Array:

@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 
 from hairkit.arrays import Float64Array, Int64Array
 from hairkit.errors import InputError
+from hairkit.head_model.spread_vertices import spread_points
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
@@ -98,14 +99,7 @@ def _means(sample: Float64Array, count: int, rng: np.random.Generator) -> Float6
 def _spread_seeds(sample: Float64Array, count: int, rng: np.random.Generator) -> Int64Array:
     """Return (K,) rows: candidates thinned out by keeping the one farthest from those kept."""
     pool = rng.choice(len(sample), min(len(sample), 4 * count), replace=False)
-    chosen = np.empty(count, np.int64)
-    away = np.full(len(pool), np.inf)
-    at = 0
-    for k in range(count):
-        chosen[k] = pool[at]
-        away = np.minimum(away, ((sample[pool] - sample[pool[at]]) ** 2).sum(axis=1))
-        at = int(away.argmax())
-    return chosen
+    return pool[spread_points(sample[pool], count)]
 
 
 def _medoids(features: Float64Array, means: Float64Array, cluster: Int64Array) -> Int64Array:

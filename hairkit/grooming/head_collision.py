@@ -31,6 +31,8 @@ def push_out_of_head(
     for _ in range(ROUNDS):
         lack = apart[near] - grid.sample(distance, points[near])
         near, lack = near[lack > 0], lack[lack > 0]
+        if not len(near):
+            break
         points[near] += lack[:, None] * outward(grid, distance, points[near])
     return replace(strands, points=points.astype(np.float32))
 

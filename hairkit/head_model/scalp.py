@@ -230,15 +230,18 @@ def _progressive_roots(
             tried = last
         now = int(np.searchsorted(number, wanted))
         found = take_free(point[:now], apart[:now], radius, taken, found)
-    return _places(area, number[taken], shift)
+    return even_places(area, number[taken], shift)
+
+
+def face_areas(head: Head) -> Float64Array:
+    """Return the areas (F,) of a head's faces, square metres."""
+    a, b, c = head.vertices.astype(np.float64)[head.faces.T]
+    return np.asarray(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1))
 
 
 def _scalp_area(head: Head, reach: Reach | None) -> Float64Array:
     """Return the area (F,) of each face, 0 of those that bear no hair."""
-    corners = head.vertices.astype(np.float64)[head.faces]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    bears = head.scalp[head.faces].max(axis=1) > 0.5
-    area: Float64Array = 0.5 * np.linalg.norm(normal, axis=1) * bears
+    area: Float64Array = face_areas(head) * (head.scalp[head.faces].max(axis=1) > 0.5)
     if reach is not None:
         area *= _covered_faces(head, area, reach, 1.0)
     if not area.sum() > 0:
@@ -271,7 +274,7 @@ def _candidates(
     `whole` (F,) are the faces that lie within the reach.
     """
     number = np.arange(first, last)
-    face, weight = _places(area, number, shift)
+    face, weight = even_places(area, number, shift)
     on_scalp = (head.scalp[head.faces[face]] * weight).sum(axis=1) > 0.5
     number, face = number[on_scalp], face[on_scalp]
     point = evaluate(head, face, weight[on_scalp])
@@ -282,7 +285,7 @@ def _candidates(
     return number[kept], point[kept]
 
 
-def _places(
+def even_places(
     area: Float64Array, number: Int64Array, shift: npt.NDArray[np.uint64]
 ) -> tuple[Int32Array, Float64Array]:
     """Return the faces (N,), weights (N, 3) at numbers (N,) of an even sequence on areas (F,)."""

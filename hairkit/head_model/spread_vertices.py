@@ -1,22 +1,34 @@
-"""Vertices of a head chosen evenly over a part of it."""
+"""Points chosen evenly, one by one, each farthest from those before (Gonzalez 1985)."""
 
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
-from hairkit.arrays import Int64Array
+from hairkit.arrays import Float64Array, Int64Array
 from hairkit.types.head import Head
 
 
-def spread_vertices(head: Head, candidates: Int64Array, count: int) -> Int64Array:
-    """Return vertices chosen one by one, each farthest from those before (Gonzalez 1985).
+def spread_points(
+    points: npt.NDArray[np.floating],
+    count: int,
+    apart: Float64Array | float = np.inf,
+    scale: Float64Array | float = 1.0,
+) -> Int64Array:
+    """Return the numbers of `count` rows of points (N, F), all where there are fewer.
 
-    All `candidates` (N,) where they are fewer than `count`.
+    `apart` (N,) are squared distances to what is taken already, without any the first row is; they
+    and those between points count times a scale (N,).
     """
-    points = head.vertices[candidates].astype(np.float64)
-    chosen = [0]
-    distance = ((points - points[0]) ** 2).sum(1)
-    while len(chosen) < min(count, len(points)):
-        chosen.append(int(distance.argmax()))
-        distance = np.minimum(distance, ((points - points[chosen[-1]]) ** 2).sum(1))
-    return candidates[chosen]
+    chosen = np.empty(min(count, len(points)), np.int64)
+    away = np.full(len(points), apart)
+    for k in range(len(chosen)):
+        chosen[k] = (away * scale).argmax()
+        away = np.minimum(away, ((points - points[chosen[k]]) ** 2).sum(axis=1))
+        away[chosen[k]] = -1.0  # not again, where points lie on each other
+    return chosen
+
+
+def spread_vertices(head: Head, candidates: Int64Array, count: int) -> Int64Array:
+    """Return vertices of a head; all `candidates` (N,) where they are fewer than `count`."""
+    return candidates[spread_points(head.vertices[candidates].astype(np.float64), count)]

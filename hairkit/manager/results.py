@@ -17,6 +17,7 @@ import numpy as np
 from hairkit.errors import DataError
 from hairkit.stages import OF_HOOK
 from hairkit.types.capture import Capture
+from hairkit.types.groom import Groom
 from hairkit.types.mask import Mask, Masks
 from hairkit.types.orientation import OrientationMap
 from hairkit.types.person import Person
@@ -161,12 +162,16 @@ def _words(grid: VoxelGrid) -> str:
     return f"{size} cells of {grid.spacing:.4g} m from ({origin})"
 
 
-def _strands_keep_their_roots(strands: Strands, call: Call) -> None:
-    before = call.arguments["strands"]
-    if len(strands) != len(before):
-        raise DataError(f"{len(strands)} strands of {len(before)}, expected all, in their order")
-    if np.abs(strands.roots - before.roots).max(initial=0.0) > ROOT_TOLERANCE:
-        raise DataError("a strand does not begin where it did, expected the same roots")
+def _groom_has_hair_on_its_head(groom: Groom, call: Call) -> None:
+    from hairkit.head_model.scalp import evaluate  # not needed by most commands
+
+    if not len(groom.strands):
+        raise DataError("no strand is left, expected hair")
+    if not np.array_equal(groom.head.faces, call.arguments["groom"].head.faces):
+        raise DataError("the head has other faces, expected those of the head that came in")
+    places = evaluate(groom.head, groom.root_triangle, groom.root_barycentric)
+    if np.abs(groom.strands.roots - places).max(initial=0.0) > ROOT_TOLERANCE:
+        raise DataError("a strand does not begin at the place of the head that bears its root")
 
 
 def _a_strand_starts_at_each_root(strands: Strands, call: Call) -> None:
@@ -249,7 +254,7 @@ CHECKS: dict[str, tuple[Check, ...]] = {
     "orient": (_angles_have_photo_size,),
     "solve_field": (_field_is_on_the_hull,),
     "track": (_a_strand_starts_at_each_root,),
-    "edit_strands": (_strands_keep_their_roots,),
+    "edit_groom": (_groom_has_hair_on_its_head,),
     "make_simulator": (_is_a_simulator,),
     "export_groom": (_wrote_the_file,),
 }

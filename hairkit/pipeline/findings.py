@@ -54,6 +54,7 @@ from hairkit.stages import (
     TIES,
     TRACK,
     TURN,
+    UNEDITED,
     WAVES,
     Stage,
 )
@@ -333,21 +334,14 @@ class Findings:
         """A strand from each root."""
         return self.run.once(TRACK, self.evidence, field=self.field, roots=self.roots)
 
-    @result_of(EDITED)
-    def edited(self) -> Given[Strands]:
-        """The strands after what was drawn on them by hand."""
-        edits = self.capture.chosen.edits
-        if not edits or not self.run.recipe.has(EDITED):
-            return self.strands
-        return self.run.once(EDITED, strands=self.strands, hull=self.hull, edits=Given.of(edits))
-
     @found
     def groom(self) -> Groom:
         """The groom with what was drawn on it by hand."""
-        edited, tracked = self.edited, self.tracked
-        if edited is self.strands:
-            return tracked
-        return replace(tracked, strands=replace(edited.value, group=tracked.strands.group))
+        before, edits = Given.of(self.tracked), self.capture.chosen.edits
+        self.run.keep(UNEDITED, before, "")
+        if not edits or not self.run.recipe.has(EDITED):
+            return self.tracked
+        return self.run.once(EDITED, groom=before, edits=Given.of(edits)).value
 
     @found
     def tracked(self) -> Groom:

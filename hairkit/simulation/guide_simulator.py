@@ -107,9 +107,13 @@ class GuideSimulator(ABC):
         return inverse_motion(self._torso) @ self._head
 
     def _draw(self) -> Points:
-        """Return the guides' points (P, 3), head axes, each out of the obstacles."""
-        points = self._carry()
+        """Return the guides' points (P, 3), head axes, each out of the obstacles.
+
+        Brows, lashes and beard are stiff.
+        """
+        points, stiff = self._carry(), self.strands.planted[self.strands.strand_of_point]
         keep_out(self._drawn, self._bodies, self._torso_from_head(), points)
+        points[stiff] = self.strands.points[stiff]
         return points
 
     def _measure_drawn(self) -> tuple[float, float]:

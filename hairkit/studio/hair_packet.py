@@ -20,6 +20,7 @@ from hairkit.arrays import UInt8Array
 from hairkit.grooming.densify import densify
 from hairkit.grooming.guide_weights import closest_guides
 from hairkit.grooming.locks import TAPER
+from hairkit.grooming.prepare_export import select_strands
 from hairkit.imaging.picture_file import encode_picture
 from hairkit.rendering.context import shader_source
 from hairkit.rendering.head import Solid, bust_solid, head_solid
@@ -35,7 +36,7 @@ MAGIC = PACKET.encode()
 HAIRS, POINTS = 9000, 16
 """Strands drawn and points of each: what a phone draws sixty times a second."""
 MOST_GUIDES = 700
-"""Guides that are simulated in the page."""
+"""Guides of the head's hair that are simulated in the page."""
 SKIN_EDGE, SKIN_QUALITY = 1024, 85
 """Longest edge in pixels, and JPEG quality, of the picture of the skin: about 100 kB."""
 LIGHT_CELL = 0.006
@@ -51,9 +52,7 @@ def write_packet(groom: Groom, path: Path, roots: Roots | None = None) -> None:
 
 def packet_of(groom: Groom, roots: Roots | None = None) -> bytes:
     """Return the packet of a groom; `roots` are those of the hair between its guides, if known."""
-    strands = groom.strands
-    step = max(1, -(-len(strands) // MOST_GUIDES))
-    guides = strands.select(np.arange(len(strands)) % step == 0).resampled(POINTS)
+    strands, guides = groom.strands, page_guides(groom).strands
     hair = densify(groom, HAIRS, roots=roots).resampled(POINTS)
     shape = (-1, POINTS, 3)
     joined = Strands.from_list([*guides.points.reshape(shape), *hair.points.reshape(shape)])
@@ -69,6 +68,7 @@ def packet_of(groom: Groom, roots: Roots | None = None) -> bytes:
         "head_eyes": _on_eyes(head),
         **({} if bust is None else _mesh("bust", bust)),
         "guides": guides.points.astype(np.float32).reshape(shape),
+        "stiff": guides.planted.astype(np.uint8),
         "hair": hair.points.astype(np.float32).reshape(shape),
         "carriers": followed.guides[len(guides) :].astype(np.float32),
         "weights": followed.weights[len(guides) :],
@@ -85,6 +85,14 @@ def packet_of(groom: Groom, roots: Roots | None = None) -> bytes:
         "strands": len(strands),
     }
     return pack(arrays, facts)
+
+
+def page_guides(groom: Groom) -> Groom:
+    """Return the guides of a groom that move in the page, of `POINTS` points."""
+    strands = groom.strands
+    step = max(1, -(-int((~strands.planted).sum()) // MOST_GUIDES))
+    some = select_strands(groom, strands.planted | (np.arange(len(strands)) % step == 0))
+    return replace(some, strands=some.strands.resampled(POINTS))
 
 
 def pack(arrays: dict[str, npt.NDArray[Any]], facts: dict[str, Any]) -> bytes:

@@ -261,7 +261,7 @@ class Project:
 
     def edit(self, edits: Edits) -> None:
         """Keep what was drawn over the hair."""
-        write_text(self.folder / EDITS, json.dumps({"strokes": edits.values()}) + "\n")
+        edits.write(self.folder / EDITS)
 
     @property
     def chosen(self) -> Chosen:

@@ -91,6 +91,7 @@ class Routes:
             ("/api/head", "POST", self._nudge),
             ("/api/edits", "GET", self._edits),
             ("/api/edits", "PUT", self._edit),
+            ("/api/edits/stroke", "POST", self._stroke),
             ("/api/choices", "GET", self._choices),
             ("/api/choices", "PUT", self._choose),
             ("/api/build", "POST", self._build),
@@ -291,7 +292,8 @@ class Routes:
             return Response(read_bytes(path), media_type="image/png")
 
     async def _edits(self, request: Request) -> Response:
-        return JSONResponse({"strokes": self._studio.project.edits.values()})
+        strokes = {"strokes": self._studio.project.edits.values()}
+        return JSONResponse(strokes | await self._studio.editor.call("brushes", PHOTO_S, {}))
 
     async def _edit(self, request: Request) -> Response:
         """Keep the strokes over the hair: all of them, so that undoing one is leaving it out."""
@@ -300,6 +302,12 @@ class Routes:
             self._studio.project.edit(edits)
         self._studio.changed(touched=[EDITS])
         return JSONResponse({})
+
+    async def _stroke(self, request: Request) -> Response:
+        """Say what a stroke that is being drawn does to the page's guides."""
+        values = {"stroke": (await receive_json(request)).get("stroke")}
+        values["folder"] = str(self._studio.project.folder)
+        return JSONResponse(await self._studio.editor.call("stroke", PHOTO_S, values))
 
     async def _choices(self, request: Request) -> Response:
         folder = {"folder": str(self._studio.project.folder)}

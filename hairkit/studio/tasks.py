@@ -6,9 +6,11 @@ their own (`task_child`), so that a picture that crashes a decoder ends one task
 
 from __future__ import annotations
 
+import json
 import zipfile
 from collections.abc import Callable
-from dataclasses import asdict, replace
+from dataclasses import asdict
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +20,8 @@ import numpy as np
 from hairkit.api import export_for
 from hairkit.arrays import Float32Array, Float64Array, Int32Array, UInt8Array
 from hairkit.errors import HairkitError
+from hairkit.grooming.brushed_hair import Hair
+from hairkit.grooming.brushes import BRUSHES, brush_hair
 from hairkit.grooming.densify import roots_between
 from hairkit.grooming.engine_files import ENGINES
 from hairkit.head_model.scalp import roots_at
@@ -32,8 +36,8 @@ from hairkit.pipeline.recipe import load_recipe
 from hairkit.pipeline.reconstruct import reconstruct
 from hairkit.pipeline.run_record import RECORD, read_record
 from hairkit.pipeline.take_capture import take_with_choices
-from hairkit.pipeline.work_folder import LastRun, digest_of
-from hairkit.stages import EDITED, HULL, TRACK
+from hairkit.pipeline.work_folder import LastRun, digest_of, stage_file
+from hairkit.stages import EDITED, UNEDITED
 from hairkit.storage import read_bytes, write_bytes
 from hairkit.studio.clean_photo import clean_photo
 from hairkit.studio.feedback import judge_photo
@@ -49,7 +53,7 @@ from hairkit.studio.photo_tasks import (
     manager,
     prepare_photo,
 )
-from hairkit.types.edits import read_edits
+from hairkit.types.edits import GROUPS, Edits, read_edits
 from hairkit.types.groom import Groom
 from hairkit.types.head import Roots
 
@@ -115,19 +119,13 @@ def build_groom(request: dict[str, Any], tell: Tell) -> Any:
     """Reconstruct the project in `folder` into its `result`, as `hairkit reconstruct` does."""
     out = Path(request["result"])
     capture, chosen = take_with_choices(request["folder"], "default", manager())
-    groom = reconstruct(
-        capture,
-        out,
-        chosen,
-        manager(),
-        guides=request["guides"],
-        progress=_Told(tell, Path(request["stop"])),
-    )
+    told = _Told(tell, Path(request["stop"]))
+    groom = reconstruct(capture, out, chosen, manager(), guides=request["guides"], progress=told)
     _hair_packet(groom, request)
-    health = read_record(out / RECORD).health
+    health, hair = read_record(out / RECORD).health, groom.strands.select(~groom.strands.planted)
     return {
-        "strands": len(groom.strands),
-        "length_cm": round(100 * float(groom.strands.lengths().mean()), 1),
+        "strands": len(hair),
+        "length_cm": round(100 * float(hair.lengths().mean()), 1),
         "health": [[figure.light, figure.line()] for figure in health],
         "pose": _matrix(capture.chosen.head).tolist(),
     }
@@ -153,14 +151,47 @@ def draft_groom(request: dict[str, Any], tell: Tell) -> Any:
 def edit_groom(request: dict[str, Any], tell: Tell) -> Any:
     """Write the `packet` of the last run's groom with the strokes that lie over it now."""
     folder = Path(request["folder"])
-    groom, last = Groom.load(folder / "result" / "groom.npz"), LastRun(folder / "result" / "work")
-    strands, hull, edits = last.latest(TRACK), last.latest(HULL), read_edits(folder / EDITS)
-    if edits:
-        recipe = load_recipe("default")
-        strands = recipe.ask(manager(), EDITED, strands=strands, hull=hull, edits=edits)
-    strands = replace(groom.strands, points=strands.points, offsets=strands.offsets)
-    _hair_packet(replace(groom, strands=strands), request)
+    _hair_packet(_edited(folder, read_edits(folder / EDITS)), request)
     return {}
+
+
+def show_stroke(request: dict[str, Any], tell: Tell) -> Any:
+    """Return the page's guides that a `stroke` under way moves: numbers, and points (N, 16, 3)."""
+    folder = Path(request["folder"])
+    before = _page_hair(folder, _made(folder), json.dumps(read_edits(folder / EDITS).values()))
+    hair = before.copy()
+    brush_hair(hair, Edits.of([request["stroke"]], "stroke").strokes[0])
+    if len(hair.points) != len(before.points):  # strands that come and go need a whole preview
+        return {"guides": [], "points": []}
+    moved = np.flatnonzero((hair.points != before.points).any(axis=(1, 2)))
+    return {"guides": moved.tolist(), "points": np.round(hair.points[moved], 5).tolist()}
+
+
+@lru_cache(maxsize=1)
+def _page_hair(folder: Path, made: int, edits: str) -> Hair:
+    """Return the page's guides after strokes as JSON."""
+    from hairkit.studio.hair_packet import page_guides
+
+    return Hair.of(page_guides(_edited(folder, Edits.of(json.loads(edits), EDITS))))
+
+
+def _edited(folder: Path, edits: Edits) -> Groom:
+    """Return the groom of the last run after strokes."""
+    groom = _unedited(folder, _made(folder))
+    return (
+        load_recipe("default").ask(manager(), EDITED, groom=groom, edits=edits) if edits else groom
+    )
+
+
+@lru_cache(maxsize=1)
+def _unedited(folder: Path, made: int) -> Groom:
+    return LastRun(folder / "result" / "work").latest(UNEDITED)
+
+
+def _made(folder: Path) -> int:
+    """Return when the last run made its groom, so that what is kept of it is known to be old."""
+    file = stage_file(folder / "result" / "work", UNEDITED)
+    return file.stat().st_mtime_ns if file.is_file() else 0
 
 
 def export_groom(request: dict[str, Any], tell: Tell) -> Any:
@@ -182,6 +213,11 @@ def list_formats(request: dict[str, Any], tell: Tell) -> Any:
     found = [(name, manager().info(name).format) for name in manager().names("export_groom")]
     plugins = [[name, format_.suffixes[0]] for name, format_ in found if format_ and format_.there]
     return {"formats": [*([_FOR + engine, f"-{engine}.zip"] for engine in ENGINES), *plugins]}
+
+
+def list_brushes(request: dict[str, Any], tell: Tell) -> Any:
+    """Return the names of the brushes, and of the groups of hair that they act on."""
+    return {"brushes": [*BRUSHES], "groups": [*GROUPS]}
 
 
 def draw_guides(request: dict[str, Any], tell: Tell) -> Any:
@@ -229,7 +265,9 @@ TASKS: dict[str, Callable[[dict[str, Any], Tell], Any]] = {
     "draft": draft_groom,
     "export": export_groom,
     "edit": edit_groom,
+    "stroke": show_stroke,
     "formats": list_formats,
+    "brushes": list_brushes,
     "guides": draw_guides,
     "pose": describe_pose,
 }

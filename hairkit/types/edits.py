@@ -12,12 +12,15 @@ import numpy as np
 from hairkit.arrays import Float32Array, freeze
 from hairkit.errors import DataError, FormatError, InputError
 from hairkit.options import make_options, option
-from hairkit.storage import Stored, read_bytes
+from hairkit.storage import Stored, read_bytes, write_text
+from hairkit.types.strands import PLANTED
 
 MOST_BYTES = 2**24
 """Of a file of edits: some thousand strokes."""
 MOST_STROKES, MOST_POINTS = 1000, 10_000
 """Of a head, and of the path of one stroke."""
+GROUPS = ("hair", *PLANTED)
+"""Hair of the head, and what brushes plant on the face."""
 
 
 @dataclass(frozen=True)
@@ -25,12 +28,15 @@ class Brush:
     """A brush and its settings; each has its own `amount`, see `hairkit.grooming.brushes`."""
 
     brush: str = option("comb", doc="Name of the brush.")
-    radius: float = option(0.03, low=0.001, high=0.3, unit="m", doc="Radius of its ball.")
+    radius: float = option(0.03, low=0.001, high=0.1, unit="m", doc="Radius of its ball.")
     amount: float | None = option(
         None, low=0, high=1, doc="How much it does; by default the brush's own."
     )
     pitch: float = option(
         0.03, low=0.002, high=0.5, unit="m", doc="Length of one turn of what it curls."
+    )
+    group: str = option(
+        GROUPS[0], choices=GROUPS, doc="The hair that it acts on: of the head, or planted."
     )
     mirror: bool = option(False, doc="Do the same on the other side of the head.")
 
@@ -74,6 +80,10 @@ class Edits(Stored):
             {**asdict(edit.setting), "path": np.round(edit.path.astype(float), 5).tolist()}
             for edit in self.strokes
         ]
+
+    def write(self, path: Path) -> None:
+        """Write the file that `read_edits` reads."""
+        write_text(path, json.dumps({"strokes": self.values()}) + "\n")
 
 
 def read_edits(path: Path) -> Edits:

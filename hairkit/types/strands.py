@@ -26,6 +26,9 @@ from hairkit.types.preview import Previewed, draw_turn
 SEEN, CONTINUED = 0, 1
 """Groups of strands that photos show, and of those continued from them where photos show one side
 of the head only. Photos from all around make one group."""
+PLANTED = {"brows": 101, "lashes": 102, "beard": 103}
+"""Groups of hair that brushes plant on the face, by name; all others are hair of the head."""
+GROUP_NAMES = {number: name for name, number in PLANTED.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,6 +93,12 @@ class Strands(Previewed, Stored):
     def tips(self) -> Float32Array:
         """(S, 3) last points."""
         return self.points[self.offsets[1:] - 1]
+
+    @property
+    def planted(self) -> BoolArray:
+        """(S,) true for brows, lashes and beard."""
+        group = np.zeros(len(self), np.int32) if self.group is None else self.group
+        return np.isin(group, [*PLANTED.values()])
 
     @property
     def strand_of_point(self) -> Int64Array:

@@ -5,6 +5,7 @@ panel and scripts do the same things. A `Session` holds the state, a `Preview` d
 and the window only passes events on and shows the result.
 
 * `actions`: the table of actions, presets and scripts
+* `brushing`: a brush over a groom, and its strokes
 * `draw`: drawing on the GPU or the CPU
 * `head_adjustment`: manual alignment of the head with the photos
 * `head_motion`: shakes and turns of the head

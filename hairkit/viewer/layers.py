@@ -54,7 +54,7 @@ class Layers:
 
     def __init__(self, manager: Manager, results: Path | None, capture: str | None = None) -> None:
         self._manager = manager
-        self._last = LastRun(None if results is None else results / WORK)
+        self.last = LastRun(None if results is None else results / WORK)
         record = _find_record(results)
         self._recipe = load_recipe("default") if record is None else record.as_recipe()
         self.capture = _find_capture(record) if capture is None else capture
@@ -64,7 +64,7 @@ class Layers:
     @property
     def available(self) -> tuple[str, ...]:
         """Names of the layers whose data exists."""
-        last, cameras = self._last, self.cameras
+        last, cameras = self.last, self.cameras
         have = {
             "photos": self.capture is not None and bool(cameras),
             "masks": any(last.has(LABELS, view) for view in cameras),
@@ -96,7 +96,7 @@ class Layers:
     @cached_property
     def cameras(self) -> dict[str, Camera]:
         """Cameras of the photos by view name, head frame, working size; empty without a scene."""
-        scene = self._read(self._last.scene)
+        scene = self._read(self.last.scene)
         return {} if scene is None else dict(zip(scene.names, scene.cameras, strict=True))
 
     def billboards(
@@ -207,7 +207,7 @@ class Layers:
     def _read(self, stage: Stage[_Found], view: str = "") -> _Found | None:
         """Return the stored result of a stage; None if missing or of another version."""
         try:
-            return self._last.latest(stage, view)
+            return self.last.latest(stage, view)
         except HairkitError:
             return None
 

@@ -14,11 +14,17 @@ import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.errors import InputError
+from hairkit.grooming.brushed_hair import Hair
+from hairkit.grooming.brushes import BRUSHES
+from hairkit.io.capture_reader import EDITS
 from hairkit.manager import Manager
 from hairkit.pipeline.open_groom import groom_path, load_groom
 from hairkit.simulation.simulator import Measures, Surroundings
+from hairkit.stages import UNEDITED
 from hairkit.types.camera import Camera
+from hairkit.types.edits import Brush
 from hairkit.types.groom import Groom
+from hairkit.viewer.brushing import NAMES, Brushing
 from hairkit.viewer.draw.hair_data import HairBody, choose_shares, split_guides
 from hairkit.viewer.head_adjustment import EDGE, Adjustment, Rerun
 from hairkit.viewer.head_motion import HeadMotion
@@ -115,6 +121,8 @@ class Session:
         self.paused = False
         self.grabbed_lock: GrabbedLock | None = None
         self.picked: int | None = None
+        self.brushing: Brushing | None = None
+        """The brush that is taken, while which nothing moves."""
         self.message = ""
         self.pending = 0.0
         """Seconds that a script still has to simulate."""
@@ -148,11 +156,38 @@ class Session:
 
     def reload(self) -> None:
         """Reload the file; keep view, wind and options."""
-        values = dict(self.simulation.values)
         path = self.opened.path
-        self._take(open_path(path, self.manager, self._reading_of(path)))
+        self._retake(open_path(path, self.manager, self._reading_of(path)))
+
+    def _retake(self, opened: Opened) -> None:
+        values = dict(self.simulation.values)
+        self._take(opened)
         if self.simulation.infos:
             self.simulation.replace(values)
+
+    def take_brush(self, name: str) -> None:
+        """Take a brush over the groom at rest, with the strokes that are kept; `none`: put away."""
+        now, opened = self.brushing, self.opened
+        if name == NAMES[0]:
+            if now is not None:
+                self._retake(replace(opened, groom=now.groom))
+        elif now is not None:
+            now.setting = replace(now.setting, brush=name, amount=BRUSHES[name].amount)
+        else:
+            last, photos = self.layers.last, Path(self.layers.capture or "")
+            before = last.latest(UNEDITED) if last.has(UNEDITED) else opened.groom
+            path = (
+                photos if self.layers.capture and photos.is_dir() else opened.path.parent
+            ) / EDITS
+            first = Brush(name, amount=BRUSHES[name].amount)
+            self.brushing = Brushing(before, path, first, Hair.of(self.drawn))
+            self.show_strokes()
+
+    def show_strokes(self) -> None:
+        """Show the groom after the strokes, at rest, under the brush."""
+        if (now := self.brushing) is not None:
+            self._retake(replace(self.opened, groom=now.groom))
+            self.brushing, now.hair = now, Hair.of(self.drawn)
 
     def _reading_of(self, path: Path) -> Mapping[str, object]:
         """Return the import options of a file; known for the first one only."""
@@ -224,8 +259,8 @@ class Session:
         self.message = "reconstructed from the aligned head"
 
     def advance(self, seconds: float) -> None:
-        """Simulate `seconds`, unless paused."""
-        if self.paused:
+        """Simulate `seconds`, unless paused or under a brush."""
+        if self.paused or self.brushing is not None:
             return
         self._time_debt += seconds
         before = self.steps
@@ -282,6 +317,8 @@ class Session:
 
     def guide_rows(self) -> Float32Array:
         """Return the present guides (G, m, 3), head frame, metres."""
+        if self.brushing and len(self.brushing.hair.points) == len(self.body.guides):
+            return self.brushing.hair.points.astype(np.float32)
         matrix = self.world_from_head.astype(np.float32)
         rows = self.simulation.simulator.points.reshape(-1, len(self._shares), 3)
         return np.asarray((rows - matrix[:3, 3]) @ matrix[:3, :3], np.float32)
@@ -301,12 +338,12 @@ class Session:
         self.opened = opened
         self._shares = choose_shares(self._guides.strands)
         strands = self._guides.strands.resampled_at(self._shares)  # no more than is drawn
-        drawn = replace(self._guides, strands=strands)
-        self.simulation = TunableSimulator(self.manager, drawn, self._simulator)
+        self.drawn = replace(self._guides, strands=strands)
+        self.simulation = TunableSimulator(self.manager, self.drawn, self._simulator)
         self.motion = HeadMotion(opened.groom.head.joints[1].astype(np.float64))
         self.adjustment, self.adjusted = None, None
         self.layers = Layers(self.manager, opened.results, self._capture)
-        self.grabbed_lock = self.picked = None
+        self.grabbed_lock = self.picked = self.brushing = None
         self.steps, self._time_debt = 0, 0.0
         self._make_body()
 

@@ -107,24 +107,27 @@ class TunableSimulator:
         self.simulator.retune(options)
 
     def step_option(self, name: str, steps: int) -> Any:
-        """Return an option's value some steps on: of its range, its choices, or on and off."""
-        info, value = self._info(name), self.value(name)
-        if info.choices:
-            place = info.choices.index(value) + steps
-            return info.choices[place % len(info.choices)]
-        if isinstance(value, bool):
-            return not value
-        if isinstance(value, int):
-            return int(_clamp(info, value + steps))
-        if isinstance(value, float):
-            return float(_clamp(info, value + steps * _step_size(info, value)))
-        return value
+        """Return an option's value some steps on."""
+        return step_value(self._info(name), self.value(name), steps)
 
     def _info(self, name: str) -> OptionInfo:
         for info in self.infos:
             if info.name == name:
                 return info
         raise InputError(unknown_name("option", name, [info.name for info in self.infos]))
+
+
+def step_value(info: OptionInfo, value: Any, steps: int) -> Any:
+    """Return an option's value some steps on: of its range, its choices, or on and off."""
+    if info.choices:
+        return info.choices[(info.choices.index(value) + steps) % len(info.choices)]
+    if isinstance(value, bool):
+        return not value
+    if isinstance(value, int):
+        return int(_clamp(info, value + steps))
+    if isinstance(value, float):
+        return float(_clamp(info, value + steps * _step_size(info, value)))
+    return value
 
 
 def _step_size(info: OptionInfo, value: float) -> float:

@@ -15,7 +15,7 @@ from hairkit.io.coordinate_space import FileSpace
 from hairkit.io.strand_blocks import Profile, colours
 from hairkit.types.groom import HairMaterial
 from hairkit.types.point_cache import PointCache
-from hairkit.types.strands import Strands
+from hairkit.types.strands import GROUP_NAMES, Strands
 
 from .options import Options
 
@@ -44,6 +44,8 @@ class GroomCurves:
     """(P, 3) linear RGB."""
     group: Int32Array
     """(S,)."""
+    group_names: list[str]
+    """(S,) in words."""
     guide: BoolArray | None
     """(S,) or None where guides and hair are not distinguished."""
     closest: GuideWeights | None
@@ -82,7 +84,8 @@ def groom_curves(ready: PreparedGroom, options: Options) -> GroomCurves:
     assert fitted.widths is not None  # `prepare_export` has filled in all three
     assert fitted.root_uv is not None
     assert fitted.group is not None
-    _check_groups(fitted.group, fitted.counts, strict=options.axis == "unreal")
+    unreal, group = options.axis == "unreal", fitted.group
+    _check_groups(group, fitted.counts, strict=unreal)
     _check_roots(fitted.widths[fitted.offsets[:-1]])
     return GroomCurves(
         points=space.points_to_file(fitted.points),
@@ -91,7 +94,9 @@ def groom_curves(ready: PreparedGroom, options: Options) -> GroomCurves:
         root_uv=fitted.root_uv,
         density=ready.groom.root_density,
         colour=colours(ready.groom.material, fitted.counts),
-        group=fitted.group,
+        # Unreal expects 0, 1, 2, ...
+        group=np.unique(group, return_inverse=True)[1].astype(np.int32) if unreal else group,
+        group_names=[GROUP_NAMES.get(number, f"hair_{number}") for number in group.tolist()],
         guide=guide if marked else None,
         closest=closest_guides(strands) if listed and marked and guide.any() else None,
         attributes=listed,

@@ -142,6 +142,12 @@ def _write_attributes(attributes: Any, curves: GroomCurves) -> None:
     number = np.arange(len(curves.counts), dtype=np.int32)
     _write_attribute(attributes, "groom_id", "Int32", _UNIFORM, number)
     _write_attribute(attributes, "groom_group_id", "Int32", _UNIFORM, curves.group)
+    if len(np.unique(curves.group)) > 1:
+        names = imath.StringArray(len(number))
+        for at, name in enumerate(curves.group_names):
+            names[at] = name
+        sample = AbcGeom.OStringGeomParamSample(names, _UNIFORM)
+        AbcGeom.OStringGeomParam(attributes, "groom_group_name", False, _UNIFORM, 1).set(sample)
     _write_attribute(attributes, "groom_root_uv", "V2f", _UNIFORM, curves.root_uv)
     _write_attribute(attributes, "hairkit_root_density", "Float", _UNIFORM, curves.density)
     _write_attribute(attributes, "groom_color", "V3f", _VERTEX, curves.colour.at())

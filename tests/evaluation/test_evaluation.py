@@ -13,6 +13,7 @@ import pytest
 from fidelity import mean_figures
 from scipy.spatial.transform import Rotation
 
+from hairkit import Brush, Edit, Edits
 from hairkit.cli import main
 from hairkit.errors import FormatError, InputError
 from hairkit.evaluation import Evaluation, Truth, read_prediction, read_truth
@@ -21,6 +22,7 @@ from hairkit.evaluation.align import Alignment
 from hairkit.evaluation.prediction import Prediction
 from hairkit.evaluation.report import write_report
 from hairkit.evaluation.scorecard import figures
+from hairkit.grooming.brushes import edit_groom
 from hairkit.testing import VIEW_NAMES
 
 
@@ -43,6 +45,19 @@ def test_the_truth_itself_is_perfect(truth_folder: Path, out_folder: Path) -> No
     assert found.orientation_deg == pytest.approx(0.0, abs=0.5)
     assert found.mask_iou == 1.0
     assert found.consistency == 1.0
+
+
+def test_planted_hair_is_not_judged(truth_folder: Path, out_folder: Path) -> None:
+    """A groom with a beard has the figures of the same groom without."""
+    truth, plain = read_truth(truth_folder), read_prediction(out_folder)
+    chin = plain.groom.head.vertices[plain.groom.head.vertices[:, 1].argmin()]
+    beard = Edit(np.array([chin]), Brush("add", 0.03, group="beard"))
+    groom = edit_groom(plain.groom, Edits((beard,)))
+    assert groom.strands.planted.any()
+    found, wanted = evaluate(replace(plain, groom=groom), truth), evaluate(plain, truth)
+    assert found.strands == wanted.strands
+    assert found.scores == wanted.scores
+    assert found.lengths == wanted.lengths
 
 
 def test_the_frame_of_the_prediction_does_not_matter(truth_folder: Path, out_folder: Path) -> None:

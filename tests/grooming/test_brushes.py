@@ -11,25 +11,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hairkit import Brush, Edit, Edits, Strands
+from hairkit import Brush, Edit, Edits, Groom, Strands
 from hairkit.errors import InputError
-from hairkit.grooming.brushes import (
-    BRUSHES,
-    CLEARANCE,
-    SHORTEST,
-    HeadRoom,
-    brush_strands,
-    edit_groom,
-)
+from hairkit.grooming.brushed_hair import CLEARANCE
+from hairkit.grooming.brushes import BRUSHES, SHORTEST, edit_groom
+from hairkit.head_model.scalp import bind
 from hairkit.head_model.signed_distance import distance_to
 from hairkit.testing import bristle_groom
 from hairkit.types.edits import read_edits
 
 GROOM = bristle_groom()
-ROOM = HeadRoom.around(GROOM)
 SHAPING = ("comb", "part", "puff", "smooth", "curl")
 STRAIGHT = ("comb", "part", "puff", "smooth", "cut", "trim", "lengthen")
-"""All but curls, which turn one way on both sides."""
+"""All that move points but curls, which turn one way on both sides."""
 
 
 @st.composite
@@ -65,7 +59,8 @@ def test_a_mirrored_stroke_is_the_mirror_of_the_other(edit: Edit) -> None:
 
 def brushed(strands: Strands, *edits: Edit) -> Strands:
     """Return hair of the ball after strokes."""
-    return brush_strands(strands, Edits(edits), ROOM, BRUSHES)[0]
+    groom = Groom(strands, GROOM.head, *bind(strands.roots, GROOM.head))
+    return edit_groom(groom, Edits(edits)).strands
 
 
 def moved_halves(edit: Edit) -> np.ndarray[tuple[int, int, int, int], np.dtype[np.float32]]:
@@ -157,5 +152,5 @@ def test_edits_are_kept_in_a_file(tmp_path: Path) -> None:
     path.write_text("[")
     with pytest.raises(InputError, match=r"expected JSON"):
         read_edits(path)
-    with pytest.raises(InputError, match="stroke 1: no brush 'combb'"):
+    with pytest.raises(InputError, match="no brush 'combb'"):
         edit_groom(GROOM, Edits((Edit(np.eye(3), Brush("combb")),)))

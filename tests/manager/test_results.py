@@ -120,8 +120,10 @@ def strands(change: Callable[[Strands], Strands]) -> Callable[[Arguments], Any]:
     return lambda given: change(right("track", given))
 
 
-def edited(change: Callable[[Strands], Strands]) -> Callable[[Arguments], Any]:
-    return lambda given: change(given["strands"])
+def edited(**changes: Callable[[Any], Any]) -> Callable[[Arguments], Any]:
+    return lambda given: replace(
+        given["groom"], **{name: of(getattr(given["groom"], name)) for name, of in changes.items()}
+    )
 
 
 def simulator(**members: Any) -> Callable[[Arguments], Any]:
@@ -245,10 +247,15 @@ WRONG: dict[str, dict[str, Callable[[Arguments], Any]]] = {
             lambda s: replace(s, offsets=np.r_[0, 0, s.offsets[2:]])
         ),
     },
-    "edit_strands": {
-        "expected all, in their order": edited(lambda s: s.select(range(len(s) - 1))),
-        "does not begin where it did": edited(
-            lambda s: replace(s, points=s.points + np.float32([0.05, 0, 0]))
+    "edit_groom": {
+        "no strand is left": edited(
+            strands=lambda s: s.select([]),
+            root_triangle=lambda t: t[:0],
+            root_barycentric=lambda w: w[:0],
+        ),
+        "the head has other faces": edited(head=lambda h: replace(h, faces=h.faces[::-1])),
+        "does not begin at the place": edited(
+            strands=lambda s: replace(s, points=s.points + np.float32([0.05, 0, 0]))
         ),
     },
     "make_simulator": {

@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from hairkit.manager import Manager
 from hairkit.simulation import Surroundings
 from hairkit.simulation.held_guides import held_lengths
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom
-from hairkit.types.strands import Strands
+from hairkit.types.strands import PLANTED, Strands
 from hairkit.types.tie import Tie
 
 TIE = Tie(np.array([0.0, 0.06, -0.12]), np.array([0.0, 0.0, -1.0]), 0.008, "tail")
@@ -43,6 +44,27 @@ def test_strands_are_held_up_to_their_ring() -> None:
     assert held[:5] == pytest.approx(way[:5], abs=0.006)
     assert held[5] == 0
     assert not held_lengths(replace(groom, ties=())).any()
+
+
+@pytest.mark.parametrize("name", ["pbd", "rods", "super_helix"])
+def test_brows_are_stiff(name: str) -> None:
+    """On a head that turns fast, brows go with it wholly where hair of the head lags behind."""
+    groom = bristle_groom()
+    count = len(groom.strands)
+    group = np.where(np.arange(count) % 2, PLANTED["brows"], 0)
+    groom = replace(groom, strands=replace(groom.strands, group=group))
+    simulator = Manager.loaded().call("make_simulator", name, groom=groom)
+    rest, worst = simulator.points.reshape(count, -1, 3).copy(), np.zeros(count)
+    for step in range(1, 20):
+        angle = 0.4 * np.sin(0.8 * step)
+        head = np.eye(4)
+        head[:3, :3] = Rotation.from_rotvec([0, 0, angle]).as_matrix()
+        simulator.advance(1 / 60, Surroundings(head_from_rest=head))
+        own = simulator.points.reshape(count, -1, 3) @ head[:3, :3]
+        worst = np.maximum(worst, np.linalg.norm(own - rest, axis=2).max(axis=1))
+    stiff = groom.strands.planted
+    assert worst[stiff].max() < 1e-5
+    assert worst[~stiff].min() > 1e-4
 
 
 @pytest.mark.parametrize("name", ["pbd", "rods", "super_helix"])

@@ -213,7 +213,10 @@ def test_turns_are_those_that_the_page_names() -> None:
 
 def test_strokes_over_the_hair_are_kept(server: Any) -> None:
     """Strokes come back as they were sent; what is no stroke is refused, and nothing is written."""
-    assert server.ask("GET", "/api/edits").json == {"strokes": []}
+    given = server.ask("GET", "/api/edits").json
+    assert given["strokes"] == []
+    assert {"comb", "add", "thin"} <= {*given["brushes"]}
+    assert given["groups"] == ["hair", "brows", "lashes", "beard"]
     stroke = {"brush": "cut", "radius": 0.02, "mirror": True, "path": [[0.1, 0, 0]]}
     assert server.ask("PUT", "/api/edits", {"strokes": [stroke]}).status == 200
     [kept] = server.ask("GET", "/api/edits").json["strokes"]
@@ -223,6 +226,9 @@ def test_strokes_over_the_hair_are_kept(server: Any) -> None:
         assert answer.status == 422
         assert "edits" in answer.json["error"]
     assert server.ask("GET", "/api/edits").json["strokes"] == [kept]
+    early = server.ask("POST", "/api/edits/stroke", {"stroke": stroke})
+    assert early.status == 422
+    assert "run all stages first" in early.json["error"]
     assert read_capture_edits(server.folder) == [kept]
 
 

@@ -137,9 +137,9 @@ def track(roots: Roots, options: Options) -> Strands:
 
 
 @hookimpl
-def edit_strands(strands: Strands, options: Options) -> Strands:
+def edit_groom(groom: Groom, options: Options) -> Groom:
     _begin("edit", options)
-    return strands
+    return groom
 
 
 @hookimpl

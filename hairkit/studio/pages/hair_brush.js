@@ -1,10 +1,6 @@
 // Brushes over the hair: the strokes of the project, their settings, undo and redo.
 import { get, make, say, send } from "./api.js";
 
-const BRUSHES = {
-  comb: "Comb", part: "Part", puff: "Puff up", smooth: "Smooth", curl: "Curl", cut: "Cut",
-  lengthen: "Lengthen",
-};
 const FINEST_M = 0.002; // between places of a path
 const KEPT = "undone strokes"; // in the storage of the tab, so that a reload loses none
 
@@ -12,29 +8,48 @@ export class HairBrush {
   constructor() {
     this.path = null; // places of the brush while it is down, metres
     this.strokes = [];
-    const choose = ([name, words]) => make("option", { value: name }, words);
-    this.choice = make("select", { "aria-label": "Brush" },
-      make("option", { value: "" }, "No brush"), ...Object.entries(BRUSHES).map(choose));
+    this.choice = make("select", { "aria-label": "Brush", onchange: () => this.choose() },
+      make("option", { value: "" }, "No brush"));
+    this.group = make("select", { "aria-label": "Acts on" });
     this.size = make("input", {
-      type: "range", min: "1", max: "8", step: "0.5", value: "3",
+      type: "range", min: "0.2", max: "8", step: "0.2", value: "3",
       "aria-label": "Radius of the brush in centimetres",
+    });
+    this.amount = make("input", {
+      type: "number", min: "0", max: "1", step: "any", placeholder: "usual",
+      "aria-label": "Amount: metres, or a share",
     });
     this.mirror = make("input", { type: "checkbox", "aria-label": "Both sides" });
     this.undo = make("button", { type: "button", onclick: () => this.back() }, "Undo");
     this.redo = make("button", { type: "button", onclick: () => this.forth() }, "Redo");
-    this.controls = [
-      this.choice, make("label", {}, "Size", this.size),
-      make("label", {}, "Both sides", this.mirror), this.undo, this.redo,
+    this.settings = [ // of a brush: on a phone there is no room for them without one
+      this.group, make("label", {}, "Size", this.size), make("label", {}, "Amount", this.amount),
+      make("label", {}, "Both sides", this.mirror),
     ];
+    for (const setting of this.settings) setting.hidden = true;
+    this.controls = [this.choice, ...this.settings, this.undo, this.redo];
     this.load();
   }
 
   get name() { return this.choice.value; }
 
+  get onSkin() { return this.group.value !== "hair"; }
+
   get radius() { return Number(this.size.value) / 100; }
 
+  // Lets the studio read the hair before the first stroke, by one that reaches none.
+  choose() {
+    for (const setting of this.settings) setting.hidden = !this.name;
+    send("POST", "/api/edits/stroke", { stroke: { path: [[9, 9, 9]] } }).catch(() => {});
+  }
+
   async load() {
-    try { this.strokes = (await get("/api/edits")).strokes; } catch (error) { say(error.message); }
+    try {
+      const { strokes, brushes, groups } = await get("/api/edits");
+      this.strokes = strokes;
+      this.choice.append(...brushes.map(option));
+      this.group.append(...groups.map(option));
+    } catch (error) { say(error.message); }
     this.show();
   }
 
@@ -43,22 +58,44 @@ export class HairBrush {
     this.redo.disabled = !undone().length;
   }
 
-  // Goes on to a place; returns where it was before and the way from there, null if too near.
+  // Goes on to a place; returns whether it is far enough from the one before.
   draw(at) {
-    const last = this.path?.at(-1), way = last && at.map((v, k) => v - last[k]);
-    if (way && Math.hypot(...way) < FINEST_M) return null;
+    const last = this.path?.at(-1);
+    if (last && Math.hypot(...at.map((v, k) => v - last[k])) < FINEST_M) return false;
     this.path = [...this.path ?? [], at];
-    return way ? { last, way } : null;
+    return true;
   }
 
-  drop() { this.path = null; }
+  // Shows what the stroke does so far, as the studio says; asks once at a time.
+  async preview(motion) {
+    this.more = Boolean(this.asked);
+    if (this.asked) return;
+    this.asked = this.stroke();
+    const { guides, points } = await send("POST", "/api/edits/stroke", { stroke: this.asked })
+      .catch(() => ({ guides: [], points: [] })); // the whole preview says what is wrong
+    this.asked = null;
+    if (this.path) motion.show(guides, points);
+    if (this.path && this.more) this.preview(motion);
+  }
 
-  lift() {
-    if (!this.path) return;
-    const stroke = {
-      brush: this.name, radius: this.radius, mirror: this.mirror.checked, path: this.path,
-    };
+  // The stroke as far as it is drawn.
+  stroke() {
+    const { name: brush, radius, path, amount: { value, validity } } = this;
+    const [group, mirror] = [this.group.value, this.mirror.checked];
+    const amount = value && validity.valid ? Number(value) : null;
+    return { brush, radius, mirror, group, path, amount };
+  }
+
+  drop(motion) {
     this.path = null;
+    motion.show([], []);
+  }
+
+  lift(motion) {
+    if (!this.path) return;
+    const stroke = this.stroke();
+    this.path = null;
+    motion.shown.clear(); // what is shown stays until the whole preview comes
     keep([]);
     this.send([...this.strokes, stroke]);
   }
@@ -87,6 +124,10 @@ export class HairBrush {
       say(error.message);
     }
   }
+}
+
+function option(name) {
+  return make("option", { value: name }, name[0].toUpperCase() + name.slice(1));
 }
 
 function undone() { return JSON.parse(sessionStorage.getItem(KEPT) ?? "[]"); }

@@ -107,7 +107,7 @@ class HairControls {
 
   up(event) {
     this.pointers.delete(event.pointerId);
-    this.brush?.lift();
+    this.brush?.lift(this.motion);
     this.hold(null);
   }
 
@@ -122,7 +122,7 @@ class HairControls {
       ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1],
     }[event.key];
     const act = way ? () => this.arrow(...way) : {
-      p: () => this.press(), Escape: () => { this.brush?.drop(); this.hold(null); },
+      p: () => this.press(), Escape: () => { this.brush?.drop(this.motion); this.hold(null); },
       "+": () => this.zoom(0.9), "-": () => this.zoom(1.1),
       w: () => { this.wind.value = Number(this.wind.value) > 0 ? 0 : WIND; },
       s: () => { this.shaken = 0; },
@@ -169,7 +169,7 @@ class HairControls {
   // Puts the brush down in the middle, or lifts it; without one takes a strand, or lets it go.
   press() {
     const { clientWidth: w, clientHeight: h } = this.canvas;
-    if (this.brush?.path) this.brush.lift();
+    if (this.brush?.path) this.brush.lift(this.motion);
     else if (this.brush?.name) this.stroke(w / 2, 0.4 * h);
     else this.take();
   }
@@ -186,16 +186,15 @@ class HairControls {
     this.draw(last.map((value, k) => value + across * right[k] + upwards * up[k]));
   }
 
-  // Shows at once what a comb does; other brushes show when the studio has done the stroke.
   draw(at) {
-    const { name, radius } = this.brush, drawn = this.brush.draw(at);
-    if (drawn && name === "comb") this.motion.comb(drawn.last, drawn.way, radius);
+    if (this.brush.draw(at)) this.brush.preview(this.motion);
   }
 
-  // Returns the place on the foremost hair under a point of the canvas, in pixels. A stroke goes
-  // along the hair: no farther in depth than across, and at its own depth where there is none.
+  // Returns the place on the foremost hair, or skin, under a point of the canvas, in pixels. A
+  // stroke goes along it: no farther in depth than across, at its own depth where there is none.
   under(x, y) {
-    const { motion: { now }, canvas: { clientWidth: w, clientHeight: h } } = this;
+    const { canvas: { clientWidth: w, clientHeight: h } } = this;
+    const now = this.brush.onSkin ? this.view.packet.arrays.head_points.data : this.motion.now;
     const { matrix, eye, right, up, back } = this.view.camera(), slope = Math.tan(0.25);
     const ray = right.map((v, k) =>
       (2 * x / w - 1) * slope * (w / h) * v + (1 - 2 * y / h) * slope * up[k] - back[k]);

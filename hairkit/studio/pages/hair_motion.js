@@ -22,6 +22,7 @@ export class HairMotion {
     this.rest = Float32Array.from(guides.data); // brushes change it
     this.now = Float32Array.from(guides.data);
     this.before = Float32Array.from(guides.data);
+    this.stiff = packet.arrays.stiff.data; // 1 for brows, lashes and beard: they stay
     this.capsules = capsules.data;
     this.wind = [0, 0, 0];
     this.turn = 0; // radians about the vertical axis, of the head
@@ -29,6 +30,7 @@ export class HairMotion {
     this.time = 0;
     this.left = 0;
     this.held = null; // {guide, point, at: [x, y, z]}
+    this.shown = new Map(); // shapes of guides before the stroke under way
     this.lengths = new Float32Array(this.count * this.points);
     for (let g = 0; g < this.count; g += 1) {
       for (let p = 1; p < this.points; p += 1) {
@@ -39,27 +41,27 @@ export class HairMotion {
     }
   }
 
-  // Takes hair along with a brush, as hairkit.grooming.brushes does: lengths stay.
-  comb(at, way, radius) {
-    const { rest, now, points, lengths } = this;
-    for (let g = 0; g < this.count; g += 1) {
-      const moved = [];
-      for (let p = 0; p < points; p += 1) {
-        const i = (g * points + p) * 3;
-        const away = Math.hypot(rest[i] - at[0], rest[i + 1] - at[1], rest[i + 2] - at[2]);
-        const share = Math.max(1 - (away / radius) ** 2, 0) ** 2;
-        for (let k = 0; k < 3; k += 1) moved.push(rest[i + k] + share * way[k]);
+  // Gives guides the shapes that a stroke under way makes of them; others go back to theirs.
+  show(guides, points) {
+    for (const [g, shape] of this.shown) this.shape(g, shape);
+    guides.forEach((g, k) => {
+      const size = 3 * this.points;
+      if (!this.shown.has(g)) this.shown.set(g, this.rest.slice(g * size, (g + 1) * size));
+      this.shape(g, points[k].flat());
+    });
+  }
+
+  // Sets the shape at rest of a guide, which goes along.
+  shape(g, places) {
+    const { rest, now, before, lengths, points } = this;
+    for (let p = 0; p < points; p += 1) {
+      const i = (g * points + p) * 3;
+      for (let k = 0; k < 3; k += 1) {
+        const way = places[3 * p + k] - rest[i + k];
+        rest[i + k] += way; now[i + k] += way; before[i + k] += way;
       }
-      for (let p = 1; p < points; p += 1) {
-        const i = (g * points + p) * 3;
-        const along = [0, 1, 2].map((k) => moved[3 * p + k] - moved[3 * p + k - 3]);
-        const scale = lengths[g * points + p] / Math.max(Math.hypot(...along), 1e-9);
-        for (let k = 0; k < 3; k += 1) {
-          now[i + k] -= rest[i + k];
-          rest[i + k] = rest[i + k - 3] + scale * along[k];
-          now[i + k] += rest[i + k];
-        }
-      }
+      if (!p) continue;
+      lengths[i / 3] = Math.hypot(...[0, 1, 2].map((k) => rest[i + k] - rest[i + k - 3]));
     }
   }
 
@@ -77,6 +79,7 @@ export class HairMotion {
     const swing = this.turn - this.turnBefore;
     this.turnBefore = this.turn;
     for (let g = 0; g < this.count; g += 1) {
+      if (this.stiff[g]) continue;
       this.drift(g, swing);
       if (this.held?.guide === g) this.hold(g);
       this.constrain(g);

@@ -12,6 +12,7 @@ from hairkit.errors import InputError
 from hairkit.grooming.densify import densify, roots_between
 from hairkit.grooming.guide_weights import closest_guides, guide_mask
 from hairkit.grooming.locks import strand_widths
+from hairkit.grooming.prepare_export import select_strands
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
@@ -108,16 +109,7 @@ def split_guides(groom: Groom, most: int = MAX_GUIDES) -> tuple[Groom, Strands |
         guide[np.linspace(0, len(strands) - 1, most).astype(int)] = True
     if guide.all() or not guide.any():
         return groom, None
-    index = np.flatnonzero(guide)
-    alone = Groom(
-        strands.select(index),
-        groom.head,
-        groom.root_triangle[index],
-        groom.root_barycentric[index],
-        groom.material,
-        groom.physics,
-    )
-    return alone, strands.select(~guide)
+    return select_strands(groom, guide), strands.select(~guide)
 
 
 def choose_shares(guides: Strands) -> Float64Array:

@@ -84,6 +84,8 @@ def status_lines(session: Session, readings: Readings) -> list[str]:
         f"stretch {100 * readings.stretch:.2f} %   energy {1e3 * readings.energy:.3g} mJ",
         readings.renderer,
     ]
+    if session.brushing is not None:
+        lines.append(session.brushing.told)
     if session.wind.blowing:
         lines.append(f"wind {session.wind.speed:.1f} m/s from {session.wind.azimuth:.0f} deg")
     if shown.through is not None:

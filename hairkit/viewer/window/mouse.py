@@ -35,6 +35,8 @@ class Mouse:
     width: float = 1.0
     wipe: float | None = None
     """Share of the width left of the line between photo and hair; None: there is none."""
+    brush: bool = False
+    """True where the left button leads a brush; with control it orbits."""
     x: float = 0.0
     y: float = 0.0
     _drags: str | None = None
@@ -44,7 +46,10 @@ class Mouse:
     def press(self, button: int, mods: int) -> None:
         """Handle a pressed button."""
         self._start = (self.x, self.y)
-        if button == LEFT and mods & CONTROL:
+        if button == LEFT and self.brush and not mods:
+            self._drags = "stroke"
+            self.perform("stroke", {"x": self.x, "y": self.y})
+        elif button == LEFT and mods & CONTROL and not self.brush:
             self._drags = "grab"
             self.perform("grab", {"x": self.x, "y": self.y})
         elif button == MIDDLE or (button == LEFT and mods & SHIFT):
@@ -65,6 +70,8 @@ class Mouse:
         drags, self._drags = self._drags, None
         if drags == "grab":
             self.perform("release", {})
+        elif drags == "stroke":
+            self.perform("lift", {})
         away = max(abs(self.x - self._start[0]), abs(self.y - self._start[1]))
         if drags != "orbit" or away > STILL_PIXELS:
             return
@@ -78,7 +85,9 @@ class Mouse:
         """Handle a motion to pixel (x, y)."""
         right, down = (x - self.x) / self.height, (y - self.y) / self.height
         self.x, self.y = x, y
-        if self._drags == "orbit":
+        if self._drags == "stroke":
+            self.perform("stroke", {"x": x, "y": y})
+        elif self._drags == "orbit":
             self.perform("orbit", {"right": -ORBIT_DEGREES * right, "up": ORBIT_DEGREES * down})
         elif self._drags == "pan":
             self.perform("pan", {"right": right, "down": down})

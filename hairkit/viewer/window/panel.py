@@ -14,9 +14,11 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from hairkit.errors import RenderError
-from hairkit.options import OptionInfo
+from hairkit.options import OptionInfo, describe
+from hairkit.types.edits import Brush
 from hairkit.viewer.actions.actions import LOOKS
 from hairkit.viewer.actions.presets import preset_names, presets_path
+from hairkit.viewer.brushing import NAMES, Brushing
 from hairkit.viewer.draw.backdrop import BACKDROPS
 from hairkit.viewer.draw.colouring import COLOURINGS
 from hairkit.viewer.head_motion import AXES
@@ -145,10 +147,13 @@ class Panel:
             _draw_view(imgui, session, perform)
         if imgui.collapsing_header("Wind and head", imgui.TreeNodeFlags_.default_open):
             _draw_wind_and_head(imgui, session, perform)
+        if imgui.collapsing_header("Brush"):
+            _draw_brush(imgui, session.brushing, perform)
         title = f"Simulator {session.simulation.plugin}"
         if imgui.collapsing_header(title, imgui.TreeNodeFlags_.default_open):
             for info in session.simulation.infos:
-                _draw_option(imgui, session, info, perform)
+                value = session.simulation.value(info.name)
+                _draw_option(imgui, info, value, "option", perform)
             self._preset = _draw_presets(imgui, session, self._preset, perform)
         if session.layers.capture is not None and imgui.collapsing_header("Head in the photos"):
             _draw_pose(imgui, session, perform)
@@ -257,6 +262,17 @@ def _draw_wind_and_head(imgui: Any, session: Session, perform: Perform) -> None:
     )
 
 
+def _draw_brush(imgui: Any, now: Brushing | None, perform: Perform) -> None:
+    taken = NAMES[0] if now is None else now.setting.brush
+    changed, place = imgui.combo("brush", NAMES.index(taken), list(NAMES))
+    if changed:
+        perform("brush", {"name": NAMES[place]})
+    if now is not None:
+        for info in describe(Brush)[1:]:
+            _draw_option(imgui, info, getattr(now.setting, info.name), "brush_option", perform)
+        _buttons(imgui, perform, ("undo", "undo", {}), ("redo", "undo", {"by": 1}))
+
+
 def _draw_pose(imgui: Any, session: Session, perform: Perform) -> None:
     changed, on = imgui.checkbox("align the head", session.adjustment is not None)
     if changed:
@@ -290,9 +306,8 @@ def _draw_pose(imgui: Any, session: Session, perform: Perform) -> None:
         imgui.text(session.rerun.progress)
 
 
-def _draw_option(imgui: Any, session: Session, info: OptionInfo, perform: Perform) -> None:
-    """Draw the slider, check box or list of one option."""
-    value = session.simulation.value(info.name)
+def _draw_option(imgui: Any, info: OptionInfo, value: Any, action: str, perform: Perform) -> None:
+    """Draw the slider, check box or list of one option, which an action sets."""
     kind = typing.get_args(info.type) or (info.type,)
     shape = f"%.4g {info.unit}" if info.unit and "%" not in info.unit else "%.4g"
     changed = False
@@ -315,7 +330,7 @@ def _draw_option(imgui: Any, session: Session, info: OptionInfo, perform: Perfor
         imgui.text(f"{info.name}: {value}")
     _hint(imgui, info.doc)
     if changed:
-        perform("option", {"name": info.name, "value": value})
+        perform(action, {"name": info.name, "value": value})
 
 
 def _buttons(imgui: Any, perform: Perform, *row: tuple[str, str, Mapping[str, object]]) -> None:

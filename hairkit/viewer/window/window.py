@@ -303,6 +303,7 @@ class Window:
         if width > 0 and height > 0:
             self.session.size = (width, height)
             self.mouse.width, self.mouse.height = width, height
+        self.mouse.brush = self.session.brushing is not None
         self.mouse.wipe = self.session.shown.wipe if self.session.shown.through else None
 
     def _reload_changed(self) -> None:
@@ -347,10 +348,8 @@ class Window:
         self._stir()
         self._panel.on_key(key, event, mods)
         name = key_name(self._glfw, key, mods)
-        if name is not None and name not in self._keys:
-            name = name.removeprefix(
-                "SHIFT_"
-            )  # without its own binding, shift+key does what the key does
+        if name is not None and name not in self._keys:  # shift does nothing without a binding
+            name = name.removeprefix("SHIFT_")
         if event == self._glfw.RELEASE or name not in self._keys or self._panel.wants_keys:
             return
         self.perform(*self._keys[name])

@@ -25,6 +25,7 @@ from hairkit.types.strands import Strands
 ATTRIBUTES = {
     "groom_id": ("int32_t", "uni"),
     "groom_group_id": ("int32_t", "uni"),
+    "groom_group_name": ("string", "uni"),
     "groom_guide": ("int32_t", "uni"),
     "groom_root_uv": ("float32_t[2]", "uni"),
     "hairkit_root_density": ("float32_t", "uni"),
@@ -153,13 +154,15 @@ def test_unreal_finds_its_schema(tmp_path: Path) -> None:
     for name, (kind, scope) in ATTRIBUTES.items():
         assert str(found[name].getDataType()) == kind
         assert found[name].getMetaData().get("geoScope") == scope
-        assert len(numbers(found[name].getValue())) == sizes[scope]
+        assert len(found[name].getValue()) == sizes[scope]
 
 
 def test_attributes_are_the_groom(tmp_path: Path) -> None:
     """What the library reads of each attribute is what the groom holds."""
     groom = hair_groom()
     found = attributes(opened(written(groom, tmp_path))[1])
+    names = found.pop("groom_group_name").getValue()
+    assert list(names) == [f"hair_{number}" for number in groom.strands.group]
     values = {name: numbers(item.getValue()) for name, item in found.items()}
     mix = closest_guides(groom.strands)
     np.testing.assert_array_equal(values["groom_id"], np.arange(len(groom.strands)))

@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import swaying
 
 from hairkit.manager import Manager
@@ -58,6 +59,7 @@ def drive(window: Window, screen: Any) -> None:
     screen("orbit")
     press(glfw.KEY_HOME)
     grab(window, screen)
+    comb(window, screen, press)
     window.on_scroll(handle, 0.0, 4.0)
     screen("near")
     press(glfw.KEY_H)
@@ -66,6 +68,24 @@ def drive(window: Window, screen: Any) -> None:
     print("message:", window.session.message)
     press(glfw.KEY_ESCAPE)
     print("finished:", window.session.finished)
+
+
+def comb(window: Window, screen: Any, press: Any) -> None:
+    """Take the first brush, comb hair on top to the right, undo that, and put the brush away."""
+    glfw, handle, session = window._glfw, window._window, window.session
+    press(glfw.KEY_M)
+    screen("brush")
+    x, y = session.camera().project(np.array([0, 0.115, 0.03])).tolist()
+    window.on_move(handle, x, y)
+    window.on_button(handle, glfw.MOUSE_BUTTON_LEFT, glfw.PRESS, 0)
+    for step in range(1, 7):
+        window.on_move(handle, x + 5 * step, y)
+    window.on_button(handle, glfw.MOUSE_BUTTON_LEFT, glfw.RELEASE, 0)
+    screen("combed")
+    print("brush:", session.brushing.told)
+    press(glfw.KEY_Z, glfw.MOD_CONTROL)
+    screen("undone")
+    window.perform("brush", {"name": "none"})
 
 
 def grab(window: Window, screen: Any) -> None:

@@ -105,6 +105,14 @@ def test_dragging_turns_the_camera_and_home_turns_it_back(screens: Seen) -> None
     assert screens.differ("start", "near").sum() > 3000
 
 
+def test_a_brush_combs_and_undo_takes_it_back(screens: Seen) -> None:
+    """A left drag with a brush moves hair, not the camera; control and Z bring the picture back."""
+    assert "brush comb, 3.0 cm on hair; 1 strokes" in screens.said
+    moved = screens.differ("brush", "combed").sum()
+    assert moved > 30
+    assert screens.differ("brush", "undone").sum() < 0.2 * moved
+
+
 def test_a_grabbed_strand_follows_the_mouse(screens: Seen) -> None:
     """The held point is where the mouse is, and the screen shows the few thin hairs that follow."""
     assert "pulled: True" in screens.said
