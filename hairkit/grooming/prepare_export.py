@@ -14,7 +14,7 @@ import numpy as np
 from hairkit.arrays import BoolArray, Float32Array
 from hairkit.errors import InputError
 from hairkit.grooming.densify import densify, roots_between
-from hairkit.grooming.guide_weights import follow, guide_mask
+from hairkit.grooming.guide_weights import guide_mask
 from hairkit.head_model.scalp import roots_at
 from hairkit.io.strand_blocks import colours
 from hairkit.options import option
@@ -73,13 +73,14 @@ def prepare_export(groom: Groom, options: ExportOptions) -> PreparedGroom:
         Nothing is left to write, or the cache is of another groom.
     """
     path = options.cache if isinstance(options, AnimationOptions) else None
-    guides = _guides_of(groom)
-    cache = None if path is None else read_cache(path, guides)
+    cache = None if path is None else read_cache(path, _guides_of(groom))
+    simulated = groom
     if options.hairs > len(groom.strands):
-        groom = dense_groom(groom, options.hairs, options.seed)
+        simulated = _guides_of(groom)
+        groom = dense_groom(simulated, options.hairs, options.seed)
     groom = complete_groom(groom)
     strands = groom.strands
-    frames = None if cache is None else _frames(strands, guides.strands, cache)
+    frames = None if cache is None else _frames(simulated, strands, cache)
     keep = _chosen(strands, options.strands) & ~_degenerate(strands)
     if not keep.any():
         raise InputError(f"the groom has no strands to write with strands={options.strands}")
@@ -89,13 +90,10 @@ def prepare_export(groom: Groom, options: ExportOptions) -> PreparedGroom:
     return PreparedGroom(select_strands(groom, keep), cache)
 
 
-def _frames(strands: Strands, guides: Strands, cache: PointCache) -> Float32Array:
-    """Return (T, P, 3) the strands moved with the cached guides, which may have been resampled."""
-    written = strands.select(guide_mask(strands))
-    cached, count = cache.points, int(written.counts[0])
-    if not np.array_equal(written.points, guides.points):
-        cached = guides.moved_and_resampled(cached, count)
-    return follow(strands, cached, cache.head_from_rest)
+def _frames(groom: Groom, strands: Strands, cache: PointCache) -> Float32Array:
+    from hairkit.simulation.posing import pose_frames  # which uses this module
+
+    return pose_frames(groom, strands, cache)
 
 
 def dense_groom(groom: Groom, count: int, seed: int = 0) -> Groom:

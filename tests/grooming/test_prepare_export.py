@@ -114,9 +114,9 @@ def test_a_cache_comes_along_for_the_strands_that_are_written(tmp_path: Path) ->
     groom = rich_groom()
     guides = select_strands(groom, np.asarray(groom.strands.guide)).strands.points
     shift = np.array([0.0, 0.01, 0.02], np.float32)
-    cache = PointCache(
-        np.stack([guides, guides + shift]), np.array([0.0, 0.1]), np.tile(np.eye(4), (2, 1, 1))
-    )
+    motion = np.tile(np.eye(4), (2, 1, 1))
+    motion[1, :3, 3] = shift
+    cache = PointCache(np.stack([guides, guides + shift]), np.array([0.0, 0.1]), motion)
     cache.save(tmp_path / "cache.npz")
     for choice, hairs in (("all", 0), ("guides", 0), ("hair", 0), ("all", 400), ("hair", 400)):
         options = Animated(strands=choice, hairs=hairs, cache=tmp_path / "cache.npz")
@@ -127,3 +127,20 @@ def test_a_cache_comes_along_for_the_strands_that_are_written(tmp_path: Path) ->
         assert np.allclose(ready.cache.points[1], rest + shift, atol=1e-6)
     with pytest.raises(InputError, match="a cache of"):
         prepare_export(bristle_groom(), Animated(cache=tmp_path / "cache.npz"))
+
+
+def test_hair_that_follows_its_guides_stays_out_of_the_head(tmp_path: Path) -> None:
+    """Guides that fold into the head take no hair with them."""
+    groom = bristle_groom()
+    guides = groom.strands.points
+    through = 2 * np.repeat(groom.strands.roots, groom.strands.counts, axis=0) - guides
+    still = np.tile(np.eye(4), (2, 1, 1))
+    PointCache(np.stack([guides, through]), np.array([0, 0.1]), still).save(tmp_path / "cache.npz")
+    count = len(groom.strands) + 300
+    ready = prepare_export(
+        groom, Animated(strands="hair", hairs=count, cache=tmp_path / "cache.npz")
+    )
+    assert ready.cache is not None
+    rest, blown = (np.linalg.norm(frame, axis=1) for frame in ready.cache.points)
+    assert np.linalg.norm(through, axis=1).min() < rest.min() - 0.02
+    assert blown.min() > rest.min() - 0.003
