@@ -41,9 +41,6 @@ DEPTH = 0.87
 was photographed: the film curve of pictures deepens dark colours. On ten captures chroma is 1.00 of
 the photos' in the mean, and 0.10 off on a scale of logarithms; with 1 it is 1.13 and 0.14."""
 
-SHEEN = 0.9
-"""Quantile of the brightness from which pixels have the colour of light, not of hair."""
-
 DARKEST = 1e-4
 """Least brightness that is divided by."""
 
@@ -127,11 +124,11 @@ def _as_guides(strands: Strands, roots: Roots, kept: BoolArray, width: float) ->
 def measure_colour(views: Sequence[View], masks: Sequence[Mask]) -> HairMaterial:
     """Return a material with which hair is drawn as bright as it was photographed.
 
-    All means are of sRGB values. The colour near the crown is that of the upper third of the hair's
-    pixels of every view, near the tips of the lower third, both without the brightest tenth, the
-    sheen. How much darker tips are tells little of their colour, since they hang in the shade: half
-    of the difference to what is usual, on a scale of logarithms, is taken for the tips' own. Both
-    together are then made as bright as all pixels, less the `LIGHT`, and paler by `DEPTH`.
+    All are of sRGB values. The colour near the crown is the median of the upper third of the hair's
+    pixels of every view, near the tips of the lower third, which the sheen hardly moves. How much
+    darker tips are tells little of their colour, since they hang in the shade: half of the
+    difference to what is usual, on a scale of logarithms, is taken for the tips' own. Both together
+    are then made as bright as the mean of all pixels, less the `LIGHT`, and paler by `DEPTH`.
     """
     crowns, tips, every = [], [], []
     for view, mask in zip(views, masks, strict=True):
@@ -140,7 +137,7 @@ def measure_colour(views: Sequence[View], masks: Sequence[Mask]) -> HairMaterial
         crowns.append(pixels[: third + 1])
         tips.append(pixels[-third - 1 :])
         every.append(pixels)
-    root, tip = (linear_from_srgb(_without_sheen(np.concatenate(p))) for p in (crowns, tips))
+    root, tip = (linear_from_srgb(np.median(np.concatenate(p), axis=0)) for p in (crowns, tips))
     whole = linear_from_srgb(np.concatenate(every).mean(axis=0))
     crown, end = max(float(root.mean()), DARKEST), max(float(tip.mean()), DARKEST)
     tip = tip * min(np.sqrt(crown / (end * TIP_SHADE)), max(crown / end, 1.0))
@@ -154,12 +151,6 @@ def _paler(colour: Float64Array) -> Float64Array:
     mean = max(float(colour.mean()), DARKEST)
     pale = np.maximum(colour / mean, DARKEST) ** DEPTH
     return np.asarray(pale * mean / pale.mean())
-
-
-def _without_sheen(pixels: Float64Array) -> Float64Array:
-    """Return the mean (3,) of pixels (N, 3) up to the `SHEEN` quantile of brightness."""
-    brightness = pixels.sum(axis=1)
-    return np.asarray(pixels[brightness <= np.quantile(brightness, SHEEN)].mean(axis=0))
 
 
 def _hair_pixels(view: View, mask: Mask) -> Float64Array:
