@@ -53,16 +53,20 @@ class VoxelGrid(Stored):
 
     def centres(self) -> Float32Array:
         """Return the cell centres, (X, Y, Z, 3) float32, metres."""
-        axes = [self.origin[i] + (np.arange(self.shape[i]) + 0.5) * self.spacing for i in range(3)]
-        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).astype(np.float32)
+        return np.stack(np.meshgrid(*self.axes(), indexing="ij"), axis=-1)
+
+    def axes(self) -> list[Float32Array]:
+        """Return where cell centres lie along x, y and z, metres."""
+        steps = [np.arange(count) + 0.5 for count in self.shape]
+        axes = zip(self.origin, steps, strict=True)
+        return [(start + along * self.spacing).astype(np.float32) for start, along in axes]
 
     def centres_of(self, cells: BoolArray) -> Float32Array:
         """Return the centres (N, 3) of the cells that a mask (X, Y, Z) marks, in C order."""
         index = np.nonzero(cells)
         result = np.empty((len(index[0]), 3), np.float32)
-        for i, along in enumerate(index):
-            axis = self.origin[i] + (np.arange(self.shape[i]) + 0.5) * self.spacing
-            result[:, i] = axis.astype(np.float32)[along]
+        for i, (axis, along) in enumerate(zip(self.axes(), index, strict=True)):
+            result[:, i] = axis[along]
         return result
 
     def index_from_head(self, points: npt.ArrayLike) -> Float64Array:
