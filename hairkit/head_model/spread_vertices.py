@@ -13,10 +13,10 @@ def spread_vertices(head: Head, candidates: Int64Array, count: int) -> Int64Arra
 
     All `candidates` (N,) where they are fewer than `count`.
     """
-    points = head.vertices[candidates].astype(np.float64)
-    chosen = [0]
-    distance = ((points - points[0]) ** 2).sum(1)
-    while len(chosen) < min(count, len(points)):
+    points = np.ascontiguousarray(head.vertices[candidates].T, np.float64)
+    chosen, distance = [0], np.full(len(candidates), np.inf)
+    while len(chosen) < min(count, len(candidates)):
+        x, y, z = points - points[:, chosen[-1:]]
+        distance = np.minimum(distance, x * x + y * y + z * z)
         chosen.append(int(distance.argmax()))
-        distance = np.minimum(distance, ((points - points[chosen[-1]]) ** 2).sum(1))
     return candidates[chosen]
