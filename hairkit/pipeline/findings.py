@@ -344,7 +344,7 @@ class Findings:
     @found
     def groom(self) -> Groom:
         """The groom with what was drawn on it by hand."""
-        edited, tracked = self.edited, self.tracked
+        tracked, edited = self.tracked, self.edited  # it starts what runs beside the strands
         if edited is self.strands:
             return tracked
         return replace(tracked, strands=replace(edited.value, group=tracked.strands.group))
