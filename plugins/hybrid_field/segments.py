@@ -28,6 +28,7 @@ from .photo_lines import (
     TensorVolume,
     agreeing,
     join,
+    join_lines,
     lift_photo_lines,
 )
 
@@ -87,11 +88,9 @@ def find_segments(
     lines = lift_photo_lines(cameras, masks, fused, options)
     lines = agreeing(lines, hull, volume, AGREEMENT_DEG)
     inner = lines_through_cells(hull, volume, certainty, options.longest)
-    points = np.concatenate([lines.points, inner.points])
-    offsets = np.concatenate([lines.offsets, inner.offsets[1:] + lines.offsets[-1]])
-    if len(offsets) == 1:
-        return Strands(points, offsets)
-    return orient_segments(Strands(points, offsets), hull, way)
+    every = join_lines([lines, inner])
+    del lines, inner
+    return orient_segments(every, hull, way) if len(every) else every
 
 
 def lines_through_cells(
@@ -207,8 +206,8 @@ def orient_segments(segments: Strands, hull: Hull, way: Way) -> Strands:
 
 def _reverse(segments: Strands, turned: BoolArray) -> Strands:
     """Return the segments, those of `turned` (S,) with their points in reverse order."""
-    owner = segments.strand_of_point
-    rank = np.arange(len(segments.points))
-    mirrored = segments.offsets[:-1][owner] + segments.offsets[1:][owner] - 1 - rank
-    rows = np.where(turned[owner], mirrored, rank)
-    return Strands(segments.points[rows], segments.offsets)
+    counts, ends = segments.counts, segments.offsets[:-1] + segments.offsets[1:] - 1
+    rows = np.flatnonzero(np.repeat(turned, counts))
+    points = segments.points.copy()
+    points[rows] = segments.points[np.repeat(ends[turned], counts[turned]) - rows]
+    return Strands(points, segments.offsets)
