@@ -13,7 +13,7 @@ import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.cameras.depth_raster import SPLAT_CELLS, depth_behind, head_depth, point_depth
-from hairkit.field.cell_shells import erode_cells
+from hairkit.field.cell_shells import dense_surface
 from hairkit.field.growth_prior import mix_directions, unit_vectors
 from hairkit.field.smooth_volume import smooth_volume
 from hairkit.types.evidence import Evidence
@@ -62,7 +62,7 @@ def group_seen(strands: Strands, evidence: Evidence) -> Strands:
     scene, hull = evidence.scene, evidence.hull
     if not scene.one_sided:
         return strands
-    surface = hull.grid.centres_of(hull.dense & ~erode_cells(hull.dense))
+    surface = dense_surface(hull)
     seen = np.zeros(len(strands.points), bool)
     for camera, mask in zip(scene.cameras, evidence.masks, strict=True):
         hair = point_depth(camera, surface, SPLAT_CELLS * hull.grid.spacing)
