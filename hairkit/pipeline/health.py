@@ -19,11 +19,11 @@ from hairkit.cameras.landmark_equations import steep_faces
 from hairkit.field.cell_shells import dense_surface
 from hairkit.field.growth_prior import PARTED_HAIR
 from hairkit.pipeline.drawn_hair import (
-    POINTS,
     PhotoHair,
     compare_drawing,
     share_of,
     share_oriented,
+    with_pieces,
 )
 from hairkit.pipeline.figure import AMBER, GREEN, RED, Figure, Limits
 from hairkit.types.camera import Camera
@@ -348,7 +348,7 @@ def assess_drawing(shown: Sequence[PhotoHair], scene: Scene, groom: Groom) -> tu
 
     Directions of steep curls are not judged: their coils are not where those of the photos are.
     """
-    names, groom = scene.names, replace(groom, strands=groom.strands.resampled(POINTS))
+    names, groom = scene.names, with_pieces(groom)
     views = [compare_drawing(groom, *row) for row in zip(scene.cameras, shown, strict=True)]
     steep = groom.material.curl_radius * 2 * np.pi > groom.material.curl_pitch
     if not steep:

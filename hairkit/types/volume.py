@@ -14,6 +14,8 @@ from hairkit.errors import DataError
 from hairkit.storage import Stored
 from hairkit.types.torso_shape import TorsoShape
 
+SAMPLED_AT_ONCE = 2**17
+"""Points at which a grid is sampled at a time."""
 MAX_CELLS = 400**3
 """Largest number of cells a grid may have."""
 
@@ -83,6 +85,9 @@ class VoxelGrid(Stored):
 
         Outside the grid the nearest border value holds.
         """
+        if len(at := np.asarray(points)) > SAMPLED_AT_ONCE:  # what is computed of each is large
+            parts = (at[k : k + SAMPLED_AT_ONCE] for k in range(0, len(at), SAMPLED_AT_ONCE))
+            return np.concatenate([self.sample(values, part) for part in parts])
         index = np.clip(self.index_from_head(points), 0, np.array(self.shape) - 1)
         low = np.minimum(index.astype(np.int64), np.maximum(np.array(self.shape) - 2, 0))
         t = (index - low).astype(np.float32).T
