@@ -236,15 +236,11 @@ def assess_masks(masks: Sequence[Mask], scene: Scene) -> tuple[Figure, ...]:
 def assess_hull(hull: Hull, masks: Sequence[Mask], scene: Scene) -> tuple[Figure, ...]:
     """Return how well the hull of all views explains the hair of each: the mean and the worst."""
     cells = dense_surface(hull), SPLAT_CELLS * hull.grid.spacing
-    inside, overlap = (
-        dict(zip(scene.names, column, strict=True))
-        for column in np.transpose(
-            [
-                compare_hull(*cells, mask, camera, scene)
-                for mask, camera in zip(masks, scene.cameras, strict=True)
-            ]
-        )
-    )
+    views = [
+        compare_hull(*cells, mask, camera, scene)
+        for mask, camera in zip(masks, scene.cameras, strict=True)
+    ]
+    inside, overlap = (dict(zip(scene.names, part, strict=True)) for part in np.transpose(views))
     worst = min(inside, key=lambda name: inside[name])
     apart = min(overlap, key=lambda name: overlap[name])
     mean = float(np.mean(list(overlap.values())))
