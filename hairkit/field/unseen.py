@@ -11,10 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from hairkit.arrays import Float32Array, Float64Array
+from hairkit.arrays import Float32Array, Float64Array, unit_vectors
 from hairkit.cameras.depth_raster import SPLAT_CELLS, depth_behind, head_depth, point_depth
 from hairkit.field.cell_shells import dense_surface
-from hairkit.field.growth_prior import mix_directions, unit_vectors
+from hairkit.field.growth_prior import mix_directions
 from hairkit.field.smooth_volume import smooth_volume
 from hairkit.types.evidence import Evidence
 from hairkit.types.strands import CONTINUED, SEEN, Strands
@@ -34,7 +34,8 @@ FLOW_WEIGHT = 0.05
 def add_surface_planes(planes: Float64Array, hull: Hull, share: float) -> Float64Array:
     """Return the planes (N, 6) of the loose cells with a share of the hull's surface's."""
     filled = (hull.dense | (hull.head_distance < 0)).astype(np.float32)
-    normal = unit_vectors(cell_slopes(smooth_volume(filled, SURFACE_CELLS), hull.loose))
+    slopes = cell_slopes(smooth_volume(filled, SURFACE_CELLS), hull.loose)
+    normal = unit_vectors(slopes.astype(np.float64))
     seen = planes[:, :3].sum(axis=1, keepdims=True)
     return np.asarray(planes + share * SURFACE_WEIGHT * seen * outer_products(normal), np.float64)
 
@@ -47,7 +48,7 @@ def add_flow(
     `growth` (X, Y, Z) is the potential that rises to the tips.
     """
     data, weight = tensor.copy(), certainty.copy()
-    flow = unit_vectors(cell_slopes(growth, hull.loose))
+    flow = unit_vectors(cell_slopes(growth, hull.loose).astype(np.float64))
     every = np.ones(len(flow), bool)
     mix_directions(data, weight, every, flow, np.where(flow.any(axis=1), FLOW_WEIGHT, 0.0))
     return data, weight
