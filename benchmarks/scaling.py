@@ -34,16 +34,18 @@ from hairkit.storage import read_npz
 PHOTOS, GUIDES = 9, 600
 """Photos and guides of the runs in which something else changes."""
 STEPS = {
-    "photos": (9, 12, 18, 36),
-    "pixels": (360, 510, 720, 1020, 1440),
+    "photos": (3, 9, 18, 36),
+    "pixels": (360, 720, 1020, 1440),
+    "file pixels": (1440, 2000, 2880, 4000),
     "cells": (6.0, 4.8, 3.8, 3.0, 2.4),
-    "guides": (1_000, 5_000, 20_000, 50_000, 100_000),
+    "guides": (600, 5_000, 20_000, 50_000, 100_000),
 }
-"""Photos, longest edges in pixels, edges of a cell in millimetres, and guides."""
+"""Photos, longest edges in pixels that photos are scaled down to, and that their files have, edges
+of a cell in millimetres, and guides."""
 EXPONENTS = np.arange(0.3, 3.001, 0.01)
 """Exponents that are tried."""
 INK, PAPER, GRID = (60, 60, 60), (255, 255, 255), (225, 225, 225)
-COLOURS = ((180, 100, 30), (60, 140, 40), (40, 60, 200), (150, 60, 140))
+COLOURS = ((180, 100, 30), (60, 140, 40), (150, 140, 20), (40, 60, 200), (150, 60, 140))
 """Blue, green, red of a picture's parts, of 255."""
 PANEL, MARGIN = (260, 220), 46
 """Pixels of the width and height of a curve's field, and around it."""
@@ -103,8 +105,10 @@ def measure(capture: Path, kind: str, step: float) -> Run:
     with tempfile.TemporaryDirectory() as place:
         given, out = Path(place, "given"), Path(place, "out")
         choose_photos(capture, given, photos)
+        if kind == "file pixels":
+            enlarge_photos(given, int(step))
         seconds, megabytes = run_apart([str(given), "-o", str(out), *words, "--quiet"])
-        size = _pixels(given, step) if kind == "pixels" else step
+        size = _pixels(given, step) if "pixels" in kind else step
         if kind == "cells":
             size = _cells(out)
     return Run(size, seconds, megabytes)
@@ -123,6 +127,20 @@ def choose_photos(capture: Path, folder: Path, count: int) -> None:
     marks = json.loads((capture / "landmarks.json").read_text())
     names = {path.stem for path in (folder / "photos").iterdir()}
     marks["views"] = {name: view for name, view in marks["views"].items() if name in names}
+    (folder / "landmarks.json").write_text(json.dumps(marks))
+
+
+def enlarge_photos(folder: Path, edge: int) -> None:
+    """Scale photos, masks and landmarks so that the files have longest edges of `edge` pixels."""
+    scale = 1.0
+    for path in (*(folder / "photos").iterdir(), *(folder / "masks").iterdir()):
+        picture = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+        scale, drawn = edge / max(picture.shape[:2]), path.parent.name == "masks"
+        way = cv2.INTER_NEAREST if drawn else cv2.INTER_CUBIC
+        cv2.imwrite(str(path), cv2.resize(picture, None, fx=scale, fy=scale, interpolation=way))
+    marks = json.loads((folder / "landmarks.json").read_text())
+    views = marks["views"].items()
+    marks["views"] = {name: (scale * np.array(points)).tolist() for name, points in views}
     (folder / "landmarks.json").write_text(json.dumps(marks))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -78,6 +78,13 @@ class Outlines:
             whole,
         )
 
+    def arranged(self, order: Int64Array) -> Outlines:
+        """Return the outlines with the views in another order."""
+        mine = [np.flatnonzero(self.views == view) for view in order]
+        views = np.repeat(np.arange(len(order)), [len(each) for each in mine])
+        points = self.points[np.concatenate(mine)]
+        return replace(self, fields=self.fields[order], points=points, views=views)
+
     def crowns(self, ratio: float) -> tuple[Float64Array, Float64Array, Float64Array]:
         """Return each silhouette's top row, and middle column and width `ratio` widths below it.
 
@@ -104,7 +111,9 @@ def _of_one_size(masks: Sequence[Mask]) -> Sequence[Mask]:
     continued = []
     for mask in masks:
         more = ((0, height - mask.labels.shape[0]), (0, width - mask.labels.shape[1]))
-        continued.append(Mask(np.pad(mask.labels, more, mode="edge"), mask.person_known))
+        if any(after for _, after in more):
+            mask = Mask(np.pad(mask.labels, more, mode="edge"), mask.person_known)
+        continued.append(mask)
     return continued
 
 

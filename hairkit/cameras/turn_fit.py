@@ -16,10 +16,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from hairkit.arrays import Float64Array
+from hairkit.arrays import Float64Array, Int64Array
 from hairkit.cameras.camera_search import Evidence, Fit, Search
 from hairkit.cameras.landmark_equations import (
     CameraArrays,
@@ -98,6 +99,28 @@ class TurnOptions:
     )
 
 
+class Silhouettes(NamedTuple):
+    """What masks show of the outline."""
+
+    outlines: Outlines
+    cranium: Cranium | None
+    """None where it would tell nothing: no landmarks on the head, or masks of hair alone."""
+
+    @classmethod
+    def of(cls, masks: tuple[Mask, ...], head: Head, options: TurnOptions) -> Silhouettes:
+        """Return the silhouettes of all views."""
+        share = min(1.0, ALL_RAYS_OF / len(masks))
+        outlines = Outlines.of(masks, max(1, round(options.contour_points * share)))
+        if head.landmark_vertices is None or not outlines.whole:
+            return cls(outlines, None)
+        return cls(outlines, Cranium.of(head, masks, outlines.scale))
+
+    def arranged(self, order: Int64Array) -> Silhouettes:
+        """Return them with the views in another order."""
+        cranium = None if self.cranium is None else self.cranium.arranged(order)
+        return Silhouettes(self.outlines.arranged(order), cranium)
+
+
 @dataclass(frozen=True, eq=False)
 class TurnFit:
     """All evidence about the cameras of a turn, and the prior."""
@@ -114,13 +137,18 @@ class TurnFit:
 
     @classmethod
     def of(
-        cls, capture: Capture, masks: tuple[Mask, ...], head: Head, options: TurnOptions
+        cls,
+        capture: Capture,
+        masks: tuple[Mask, ...],
+        head: Head,
+        options: TurnOptions,
+        silhouettes: Silhouettes | None = None,
     ) -> TurnFit:
+        """Return the problem; `silhouettes` are those of the masks where they are known."""
         pixels = np.array([picture_scale(view.height) for view in capture.views])
         pixel = float(pixels.mean())
         turn = Turn.of(capture)
-        share = min(1.0, ALL_RAYS_OF / len(masks))
-        outlines = Outlines.of(masks, max(1, round(options.contour_points * share)))
+        outlines, cranium = silhouettes or Silhouettes.of(masks, head, options)
         angles = np.radians([options.azimuth, options.elevation, options.roll])
         each = [*angles, options.distance, options.shift, options.shift]
         sights = Sights.of(capture, masks, options.landmark_px * pixels)
@@ -142,10 +170,9 @@ class TurnFit:
         focals = [view.focal_px for view in capture.views]
         focal = None if None in focals else focals[0]
         problem = cls(turn, outlines, head, landmarks, noise, spread, focal)
-        if landmarks is None or not outlines.whole:
+        if landmarks is None or cranium is None:
             return problem
         start = problem.cameras(problem.start(flat=False).vector)
-        cranium = Cranium.of(head, masks, outlines.scale)
         return replace(problem, landmarks=landmarks.with_cranium(cranium, start))
 
     def with_sights(self, more: Sights) -> TurnFit:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hairkit.arrays import BoolArray
+from hairkit.arrays import BoolArray, Float32Array
+from hairkit.types.volume import Hull
 
 
 def dilate_cells(cells: BoolArray, rounds: int = 1) -> BoolArray:
@@ -29,3 +30,8 @@ def erode_cells(cells: BoolArray, rounds: int = 1) -> BoolArray:
     """
     empty = dilate_cells(np.pad(~cells, 1, constant_values=True), rounds)
     return ~empty[tuple(slice(1, -1) for _ in cells.shape)]
+
+
+def dense_surface(hull: Hull) -> Float32Array:
+    """Return the centres (N, 3) of the dense cells that cameras see first: their outer layer."""
+    return hull.grid.centres_of(hull.dense & ~erode_cells(hull.dense))

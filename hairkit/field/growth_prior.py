@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array, unit_vectors
 from hairkit.field.cell_shells import dilate_cells
 from hairkit.field.parting import comb_from_parting, crown_share, root_lift
 from hairkit.field.smooth_volume import smooth_volume
@@ -103,8 +103,8 @@ def comb_cells(
     near = hull.head_distance[hull.loose] < REACH
     cells = hull.loose & (hull.head_distance < REACH)
     at = hull.grid.centres_of(cells).astype(np.float64)
-    outward = _unit(cell_slopes(hull.head_distance, cells))
-    flow = _unit(cell_slopes(growth, cells))
+    outward = unit_vectors(cell_slopes(hull.head_distance, cells).astype(np.float64))
+    flow = unit_vectors(cell_slopes(growth, cells).astype(np.float64))
     return ScalpComb(near, _comb(head, at, outward, flow, LIFT, parting, hair_length))
 
 
@@ -128,7 +128,7 @@ def _comb(
         parted = comb_from_parting(parting, head, at[top], outward[top])
         combed[top] = (1 - crown[top]) * combed[top] + crown[top] * parted
         combed[top] /= np.maximum(np.linalg.norm(combed[top], axis=1, keepdims=True), 1e-6)
-    return _unit(combed + lift * outward)
+    return unit_vectors(combed + lift * outward)
 
 
 def parts(parting: Parting, hair_length: float) -> bool:
@@ -167,10 +167,10 @@ def add_scalp_prior(
         top, cells = share > 0, np.zeros(hull.grid.shape, bool)
         cells[hull.loose] = top
         points = hull.grid.centres_of(cells)
-        outward = _unit(cell_slopes(hull.head_distance, cells))
+        outward = unit_vectors(cell_slopes(hull.head_distance, cells).astype(np.float64))
         lift = root_lift(hull, points)[:, None]
         direction = comb_from_parting(parting, head, points, outward) + lift * outward
-        mix_directions(data, weight, top, _unit(direction), share[top])
+        mix_directions(data, weight, top, unit_vectors(direction), share[top])
     return data, weight
 
 
@@ -208,14 +208,7 @@ def gradient(grid: VoxelGrid, values: Float32Array, points: npt.ArrayLike) -> Fl
         ],
         axis=1,
     ).astype(np.float64)
-    return _unit(slope)
-
-
-def _unit(vectors: npt.ArrayLike) -> Float64Array:
-    """Return vectors (N, 3) at length 1, those of nearly no length as zeros."""
-    given = np.asarray(vectors, np.float64)
-    length = np.linalg.norm(given, axis=1, keepdims=True)
-    return np.where(length > 1e-9, given / np.maximum(length, 1e-9), 0.0)
+    return unit_vectors(slope)
 
 
 def measure_scalp_distance(head: Head, hull: Hull) -> ScalpDistance:

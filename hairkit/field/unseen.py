@@ -11,9 +11,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from hairkit.arrays import Float32Array, Float64Array
+from hairkit.arrays import Float32Array, Float64Array, unit_vectors
 from hairkit.cameras.depth_raster import SPLAT_CELLS, depth_behind, head_depth, point_depth
-from hairkit.field.cell_shells import erode_cells
+from hairkit.field.cell_shells import dense_surface
 from hairkit.field.growth_prior import mix_directions
 from hairkit.field.smooth_volume import smooth_volume
 from hairkit.types.evidence import Evidence
@@ -34,7 +34,8 @@ FLOW_WEIGHT = 0.05
 def add_surface_planes(planes: Float64Array, hull: Hull, share: float) -> Float64Array:
     """Return the planes (N, 6) of the loose cells with a share of the hull's surface's."""
     filled = (hull.dense | (hull.head_distance < 0)).astype(np.float32)
-    normal = _unit(cell_slopes(smooth_volume(filled, SURFACE_CELLS), hull.loose))
+    slopes = cell_slopes(smooth_volume(filled, SURFACE_CELLS), hull.loose)
+    normal = unit_vectors(slopes.astype(np.float64))
     seen = planes[:, :3].sum(axis=1, keepdims=True)
     return np.asarray(planes + share * SURFACE_WEIGHT * seen * outer_products(normal), np.float64)
 
@@ -47,7 +48,7 @@ def add_flow(
     `growth` (X, Y, Z) is the potential that rises to the tips.
     """
     data, weight = tensor.copy(), certainty.copy()
-    flow = _unit(cell_slopes(growth, hull.loose))
+    flow = unit_vectors(cell_slopes(growth, hull.loose).astype(np.float64))
     every = np.ones(len(flow), bool)
     mix_directions(data, weight, every, flow, np.where(flow.any(axis=1), FLOW_WEIGHT, 0.0))
     return data, weight
@@ -62,7 +63,7 @@ def group_seen(strands: Strands, evidence: Evidence) -> Strands:
     scene, hull = evidence.scene, evidence.hull
     if not scene.one_sided:
         return strands
-    surface = hull.grid.centres_of(hull.dense & ~erode_cells(hull.dense))
+    surface = dense_surface(hull)
     seen = np.zeros(len(strands.points), bool)
     for camera, mask in zip(scene.cameras, evidence.masks, strict=True):
         hair = point_depth(camera, surface, SPLAT_CELLS * hull.grid.spacing)
@@ -72,9 +73,3 @@ def group_seen(strands: Strands, evidence: Evidence) -> Strands:
     shares = np.add.reduceat(seen.astype(np.float64), strands.offsets[:-1]) / strands.counts
     group = np.where(shares >= SEEN_SHARE, SEEN, CONTINUED).astype(np.int32)
     return replace(strands, group=group)
-
-
-def _unit(vectors: Float32Array) -> Float64Array:
-    """Return vectors (N, 3) at length 1, those of nearly no length as zeros."""
-    length = np.linalg.norm(vectors.astype(np.float64), axis=1, keepdims=True)
-    return np.where(length > 1e-9, vectors / np.maximum(length, 1e-9), 0.0)

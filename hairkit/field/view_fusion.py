@@ -19,7 +19,7 @@ from scipy import ndimage
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
 from hairkit.cameras.depth_raster import SPLAT_CELLS, splat_depth
 from hairkit.cameras.projection_kernels import PackedCamera, Vector, pack_camera, project
-from hairkit.field.cell_shells import erode_cells
+from hairkit.field.cell_shells import dense_surface
 from hairkit.field.symmetric_eigen import smallest_eigenvectors
 from hairkit.field.unseen import add_surface_planes
 from hairkit.imaging.waves import remove_slant
@@ -136,7 +136,7 @@ def front_depths(
 
     The maps are `DEPTH_SHRINK` times smaller than the views' orientation maps.
     """
-    surface = hull.grid.centres_of(hull.dense & ~erode_cells(hull.dense))
+    surface = dense_surface(hull)
     fronts = []
     for camera, found in zip(cameras, orientations, strict=True):
         height, width = found.angle.shape

@@ -27,7 +27,7 @@ def push_out_of_head(
     points = strands.points.astype(np.float64)
     apart = clearance * np.minimum(strands.arc_lengths() / FULL_AFTER, 1.0)
     apart[strands.offsets[:-1]] = -np.inf
-    near = np.arange(len(points))
+    near = np.flatnonzero(apart > grid.sample(distance, points))
     for _ in range(ROUNDS):
         lack = apart[near] - grid.sample(distance, points[near])
         near, lack = near[lack > 0], lack[lack > 0]

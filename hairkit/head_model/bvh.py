@@ -98,7 +98,9 @@ def _nearest(
     slots = np.zeros(count, np.int64)
     weights = np.zeros((count, 3))
     distances = np.zeros(count)
-    previous = 0
+    previous = int(
+        np.int64(0)
+    )  # a plain 0 would have a type of its own, and a search compiled for it
     for i in range(count):
         slot, squared = nearest_slot(tree, points[i], previous)
         slots[i], distances[i], previous = slot, np.sqrt(squared), slot

@@ -51,6 +51,10 @@ class Cranium:
         normals = head.normals()[chosen].astype(np.float64)
         return cls(head.vertices[chosen].astype(np.float64), normals, fields, scale)
 
+    def arranged(self, order: Int64Array) -> Cranium:
+        """Return the cranium with the views in another order."""
+        return replace(self, fields=self.fields[order])
+
     def moved(self, points: Float64Array, normals: Float64Array) -> Cranium:
         """Return the cranium with other points (K, 3) and their normals (K, 3)."""
         return replace(self, points=points, normals=normals)

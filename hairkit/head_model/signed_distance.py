@@ -34,20 +34,46 @@ def signed_distance(head: Surface, grid: VoxelGrid) -> Float32Array:
     that is nearest to the nearest cell within, too large by 0.05 cells on average, at most one.
     """
     vertices, faces = closed_surface(head)
-    tree, centres = build_tree(vertices, faces), grid.centres().astype(np.float64)
-    free = _without_surface(vertices[faces], grid)
+    tree, free = build_tree(vertices, faces), _without_surface(vertices[faces], grid)
     if free.all():
-        return _distances(tree, centres.reshape(-1, 3)).reshape(grid.shape).astype(np.float32)
-    cells = distance_transform_edt(free)
+        return (
+            _distances(tree, grid.centres().reshape(-1, 3)).reshape(grid.shape).astype(np.float32)
+        )
+    cells = np.sqrt(_squared_steps(free))
     near = (cells - CROSSED) * grid.spacing < BAND
-    face, weights, exact = nearest_on_surface(tree, centres[near])
-    feet, known = np.zeros_like(centres), np.full(grid.shape, np.inf)
-    feet[near], known[near] = np.einsum("nk,nkd->nd", weights, vertices[faces[face]]), exact
-    cell = distance_transform_edt(known > BAND, return_distances=False, return_indices=True)
-    beyond = np.linalg.norm(centres - feet[tuple(cell)], axis=-1)
-    distance: Float32Array = np.minimum(known, beyond).astype(np.float32)
-    np.negative(distance, out=distance, where=_inside(tree, centres, cells <= CROSSED))
-    return distance
+    face, weights, exact = nearest_on_surface(tree, grid.centres_of(near))
+    feet = np.einsum("nk,nkd->nd", weights, vertices[faces[face]])
+    foot, beyond = np.zeros(grid.shape, np.int32), np.ones(grid.shape, np.bool_)
+    foot[near], beyond[near] = np.arange(len(feet)), exact > BAND
+    distance = _distances_to(feet, foot[tuple(_nearest_cells(beyond))], grid)
+    distance[near] = np.minimum(distance[near], exact)
+    inside, result = _inside(tree, grid, cells <= CROSSED), distance.astype(np.float32)
+    np.negative(result, out=result, where=inside)
+    return result
+
+
+def _nearest_cells(free: BoolArray) -> Int32Array:
+    """Return (3, X, Y, Z) the nearest cell that is not free."""
+    cell: Int32Array = distance_transform_edt(free, return_distances=False, return_indices=True)
+    return cell
+
+
+def _squared_steps(free: BoolArray) -> Int32Array:
+    """Return (X, Y, Z) the square of the cells to the nearest one that is not free."""
+    squared = np.zeros(free.shape, np.int32)
+    for axis, nearest in enumerate(_nearest_cells(free)):
+        own = np.arange(free.shape[axis], dtype=np.int32)
+        squared += np.square(np.moveaxis(np.moveaxis(nearest, axis, -1) - own, -1, axis))
+    return squared
+
+
+def _distances_to(feet: Float64Array, foot: Int32Array, grid: VoxelGrid) -> Float64Array:
+    """Return (X, Y, Z) the distance of each cell's centre to its foot among `feet` (N, 3)."""
+    squared = np.zeros(grid.shape)
+    for axis, along in enumerate(grid.axes()):
+        apart = np.moveaxis(along - np.moveaxis(feet[:, axis][foot], axis, -1), -1, axis)
+        squared += apart * apart
+    return np.sqrt(squared, out=squared)
 
 
 def distance_to(head: Head, points: npt.ArrayLike) -> Float64Array:
@@ -118,12 +144,16 @@ def _without_surface(corners: Float64Array, grid: VoxelGrid) -> BoolArray:
     return free
 
 
-def _inside(tree: TriangleTree, centres: Float64Array, near: BoolArray) -> BoolArray:
+def _inside(tree: TriangleTree, grid: VoxelGrid, near: BoolArray) -> BoolArray:
     """Return (X, Y, Z) which cells are inside: one by one where near, the others part by part."""
     inside = np.zeros(near.shape, np.bool_)
-    inside[near] = inside_surface(tree, centres[near])
+    inside[near] = inside_surface(tree, grid.centres_of(near))
     part, count = label(~near)
-    some = np.zeros(count + 1, np.int64)
-    some[part.ravel()] = np.arange(part.size)  # a cell of each part
-    inside[~near] = inside_surface(tree, centres.reshape(-1, 3)[some])[part[~near]]
+    some = np.zeros(count + 1, np.int32)
+    some[part.ravel()] = np.arange(part.size, dtype=np.int32)  # a cell of each part
+    at = [
+        axis[cell]
+        for axis, cell in zip(grid.axes(), np.unravel_index(some, near.shape), strict=True)
+    ]
+    inside[~near] = inside_surface(tree, np.stack(at, axis=1))[part[~near]]
     return inside

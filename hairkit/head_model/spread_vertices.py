@@ -21,10 +21,10 @@ def spread_points(
     and those between points count times a scale (N,).
     """
     chosen = np.empty(min(count, len(points)), np.int64)
-    away = np.full(len(points), apart)
+    columns, away = np.ascontiguousarray(points.T), np.full(len(points), apart)
     for k in range(len(chosen)):
         chosen[k] = (away * scale).argmax()
-        away = np.minimum(away, ((points - points[chosen[k]]) ** 2).sum(axis=1))
+        away = np.minimum(away, ((columns - columns[:, chosen[k], None]) ** 2).sum(axis=0))
         away[chosen[k]] = -1.0  # not again, where points lie on each other
     return chosen
 

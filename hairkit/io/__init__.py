@@ -9,7 +9,7 @@ every size before they ask for memory. Grooms and caches save and load themselve
 * `capture_toml`: `capture.toml`
 * `card_file`: what files of hair cards hold
 * `coordinate_space`: axes and unit of a file
-* `exif`: TIFF directories: EXIF tags of photos, headers of TIFF files
+* `exif`: EXIF tags of photos
 * `file_format`: what a format carries, as its plugin declares it
 * `framed_photos`: photos cropped to the head, at the resolution of the files
 * `glb_document`: glTF documents under construction
@@ -25,6 +25,7 @@ every size before they ask for memory. Grooms and caches save and load themselve
 * `photos`: photos, with their headers checked first
 * `plain_settings`: settings of a groom as numbers, texts and lists
 * `ply_elements`: elements of PLY files, and strands from them
+* `png_chunks`: the chunks of PNG files
 * `polylines`: strands from loose edges
 * `spline_curves`: points on spline curves from control points
 * `streamed`: arrays made while they are written
@@ -33,5 +34,4 @@ every size before they ask for memory. Grooms and caches save and load themselve
 * `textures`: texture maps of mesh files
 * `video`: a video of a turn as a capture
 * `video_child`: the process that decodes videos
-* `webp`: the header of WebP files
 """

@@ -138,11 +138,6 @@ def read_capture_file(path: Path) -> CaptureFile:
     )
 
 
-def write_head_entry(path: Path, entry: HeadEntry) -> None:
-    """Put the head's pose into a `capture.toml`, made where there is none; all else in it stays."""
-    write_table(path, "head", head_values(entry))
-
-
 def head_values(entry: HeadEntry) -> dict[str, object]:
     """Return the entries of a table that places a head."""
     return {field.name: getattr(entry, field.name) for field in fields(entry)}
@@ -206,7 +201,7 @@ def _lines_without(path: Path, header: str) -> list[str]:
 
 
 def head_entry(pose: Float64Array) -> HeadEntry:
-    """Return the `[head]` table of a similarity (4, 4), to a tenth of a micrometre."""
+    """Return the table that places a head, of a similarity (4, 4), to a tenth of a micrometre."""
     scale = float(np.cbrt(np.linalg.det(pose[:3, :3])))
     turn = pose[:3, :3] / scale
     angles = (

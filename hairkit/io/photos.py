@@ -5,11 +5,11 @@ Sizes and focal lengths are those of the upright picture, after EXIF rotation.
 
 from __future__ import annotations
 
+import io
 import math
 import os
 import re
 import struct
-import zlib
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -17,12 +17,17 @@ from typing import Any
 import cv2
 import numpy as np
 import numpy.typing as npt
+from PIL import Image, ImageFile
+from PIL.JpegImagePlugin import JpegImageFile
+from PIL.PngImagePlugin import PngImageFile
+from PIL.TiffImagePlugin import ImageFileDirectory_v2, TiffImageFile
+from PIL.WebPImagePlugin import WebPImageFile
 
 from hairkit.arrays import UInt8Array
 from hairkit.errors import FormatError, InputError
-from hairkit.io.exif import Exif, clear_orientation, read_exif, scan_tiff
+from hairkit.io.exif import DAMAGE, Exif, quiet_pillow, read_exif
 from hairkit.io.heic import decode_heic, is_heic, read_heic_header
-from hairkit.io.webp import is_webp, scan_webp
+from hairkit.io.png_chunks import SIGNATURE, check_png_data, scan_png
 from hairkit.storage import read_bytes
 
 MAX_PIXELS = 64_000_000
@@ -44,14 +49,27 @@ _CROPPED = 0.02
 """Relative change of the aspect ratio since the picture was taken; more means it was cropped."""
 _KINDS = {
     b"\xff\xd8\xff": "JPEG",
-    b"\x89PNG\r\n\x1a\n": "PNG",
+    SIGNATURE: "PNG",
     b"GIF8": "GIF",
     b"BM": "BMP",
     b"II*\0": "TIFF",
     b"MM\0*": "TIFF",
     b"%PDF": "PDF",
 }
-_FILL, _START_OF_IMAGE, _END_OF_IMAGE, _START_OF_SCAN, _EXIF_SEGMENT = 0xFF, 0xD8, 0xD9, 0xDA, 0xE1
+_READERS: dict[str, type[ImageFile.ImageFile]] = {
+    "JPEG": JpegImageFile,
+    "PNG": PngImageFile,
+    "WebP": WebPImageFile,
+    "TIFF": TiffImageFile,
+}
+_TURNED = ("HEIC", "TIFF")
+"""Kinds whose readers turn the picture by themselves."""
+_SIZE, _TILE_EDGES = {256, 257}, (322, 323)
+_BITS, _PHOTOMETRIC, _SAMPLE_FORMAT, _DNG_VERSION = 258, 262, 339, 50706
+"""Tags of TIFF (TIFF 6.0, 1992)."""
+_GREY_AND_RGB = (0, 1, 2)
+"""Photometric interpretations: white is zero, black is zero, RGB."""
+_FILL, _START_OF_IMAGE, _END_OF_IMAGE, _START_OF_SCAN = 0xFF, 0xD8, 0xD9, 0xDA
 """Second bytes of JPEG's markers (ITU-T T.81, table B.1); the first is the fill byte."""
 _RESTARTS = range(0xD0, 0xD8)
 _JPEG_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
@@ -65,9 +83,6 @@ _AS_STORED = cv2.IMREAD_IGNORE_ORIENTATION
 _THUMBNAIL = cv2.IMREAD_REDUCED_GRAYSCALE_8
 _MID_GREY, _BLOCK = 128, 4
 """Value of blocks without data, and the edge of a block of 8 pixels at half its size."""
-_MISSING = "some of its picture data is missing"
-_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
-"""Samples of a pixel by PNG's colour type."""
 
 
 @dataclass(frozen=True)
@@ -138,9 +153,7 @@ def read_photo(
     data = read_bytes(path, MAX_BYTES)
     header = _header(data, Path(path))
     scale = min(1.0, (max_edge or math.inf) / max(header.width, header.height))
-    # a JPEG decoder halves pictures almost for free; never below the size that is wanted
-    mode = cv2.IMREAD_REDUCED_COLOR_2 if scale <= 0.5 else cv2.IMREAD_COLOR
-    image = _decode(data, mode, Path(path))[..., ::-1]
+    image = _decode(data, Path(path), half=scale <= 0.5)
     upright = _upright(image, header.exif.orientation)
     if scale < 1:
         size = [max(1, round(edge * scale)) for edge in (header.width, header.height)]
@@ -156,7 +169,7 @@ def decode_picture(data: bytes, source: str | os.PathLike[str]) -> UInt8Array:
     Raises what `read_photo` raises, naming `source`.
     """
     _header(data, Path(source))
-    return np.ascontiguousarray(_decode(data, cv2.IMREAD_COLOR, Path(source))[..., ::-1])
+    return _decode(data, Path(source))
 
 
 def read_drawing(path: str | os.PathLike[str]) -> UInt8Array:
@@ -167,11 +180,7 @@ def read_drawing(path: str | os.PathLike[str]) -> UInt8Array:
     data = read_bytes(path, MAX_BYTES)
     if _header(data, Path(path)).kind != "PNG":
         raise InputError(f"{path}: masks must be PNG files, because JPEG smears their labels")
-    pixels = _decode(data, cv2.IMREAD_UNCHANGED, Path(path))
-    if pixels.dtype != np.uint8:
-        pixels = (pixels >> 8).astype(np.uint8)
-    if pixels.ndim == 2:
-        return pixels
+    pixels = _decode(data, Path(path), mode="RGBA")
     if pixels.shape[2] == 4 and (pixels[..., 3] != 255).any():
         return np.ascontiguousarray(pixels[..., 3])
     if (pixels[..., :3] != pixels[..., :1]).any():
@@ -187,29 +196,60 @@ def _header(data: bytes, path: Path) -> PhotoHeader:
         width, height, exif_block = _scan(kind, data, str(path))
     except FormatError:
         raise
-    except (struct.error, IndexError, ValueError) as error:
+    except Image.DecompressionBombError as error:
+        raise InputError(f"{path}: more than {MAX_PIXELS} pixels; scale it down") from error
+    except DAMAGE as error:
         raise FormatError(f"{path}: damaged {kind} file; save it again") from error
     if width * height > MAX_PIXELS or not width * height:
         raise InputError(
             f"{path}: {width} x {height} pixels, expected 1 to {MAX_PIXELS} in all; scale it down"
         )
     exif = read_exif(exif_block)
-    if kind == "HEIC":
-        exif = replace(exif, orientation=1)  # the decoder turns the picture by the file's own tag
+    if kind in _TURNED:
+        exif = replace(exif, orientation=1)
     if exif.orientation >= 5:
         width, height = height, width
     return PhotoHeader(kind, width, height, exif)
 
 
 def _scan(kind: str, data: bytes, where: str) -> tuple[int, int, bytes]:
-    """Return width and height as stored, and the EXIF block, by the kind of the file."""
+    """Return width and height as they are decoded, and the EXIF block, by the kind of the file."""
     if kind == "HEIC":
         return read_heic_header(data, where)
-    if kind == "WebP":
-        return scan_webp(data, where)
+    if kind == "PNG":
+        return scan_png(data)
     if kind == "TIFF":
-        return (*scan_tiff(data, where), data)  # EXIF has TIFF's own tags
-    return _scan_jpeg(data) if kind == "JPEG" else _scan_png(data)
+        _check_tiff(data, where)
+    with quiet_pillow():
+        picture = _READERS[kind](io.BytesIO(data))
+    if getattr(picture, "is_animated", False):
+        raise FormatError(f"{where}: an animation, expected a photo")
+    exif = data if kind == "TIFF" else picture.info.get("exif", b"")  # EXIF has TIFF's own tags
+    return (*picture.size, exif)
+
+
+def _check_tiff(data: bytes, where: str) -> None:
+    """Raise `FormatError` for a raw photo, and for samples that are not 8 or 16 bit grey or RGB."""
+    tags, file = ImageFileDirectory_v2(data[:8]), io.BytesIO(data)
+    file.seek(tags.next)
+    with quiet_pillow():
+        tags.load(file)
+    if not tags.keys() >= _SIZE:
+        raise ValueError("no size")
+    if _DNG_VERSION in tags:
+        raise FormatError(f"{where}: a raw photo, expected a developed one; save it as JPEG or PNG")
+    bits, kind = set(tags.get(_BITS, (1,))), tags.get(_PHOTOMETRIC, 0)
+    if (
+        bits not in ({8}, {16})
+        or set(tags.get(_SAMPLE_FORMAT, (1,))) != {1}
+        or kind not in _GREY_AND_RGB
+    ):
+        raise FormatError(
+            f"{where}: TIFF of {max(bits)} bits a sample, photometric interpretation {kind};"
+            " expected 8 or 16 bits of grey or RGB; save it as JPEG or PNG"
+        )
+    if math.prod(tags.get(edge, 1) for edge in _TILE_EDGES) > MAX_PIXELS:
+        raise ValueError("tiles of an unusual size")
 
 
 def _kind(data: bytes) -> str:
@@ -219,31 +259,10 @@ def _kind(data: bytes) -> str:
         return "HEIC"
     if data[4:8] == b"ftyp":
         return "AVIF or a video"
-    if is_webp(data):
+    if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
         return "WebP"
     named = (kind for start, kind in _KINDS.items() if data.startswith(start))
     return next(named, "not a picture")
-
-
-def _scan_jpeg(data: bytes) -> tuple[int, int, bytes]:
-    """Return width, height and the EXIF block of a JPEG file; `ValueError` when it is cut short."""
-    position, exif, size = 2, b"", (0, 0)
-    while True:
-        while data[position + 1] == _FILL:
-            position += 1
-        marker, (length,) = data[position + 1], struct.unpack_from(">H", data, position + 2)
-        if data[position] != _FILL or length < 2:
-            raise ValueError("no marker")
-        block = data[position + 4 : position + 2 + length]
-        if marker in _JPEG_FRAMES:
-            height, width = struct.unpack_from(">HH", block, 1)
-            size = (width, height)
-        elif marker == _EXIF_SEGMENT and block.startswith(b"Exif\0\0"):
-            exif = exif or block[6:]
-        elif marker == _START_OF_SCAN:
-            break
-        position += 2 + length
-    return (*size, exif)
 
 
 def _loses_data(data: bytes, pixels: npt.NDArray[Any]) -> bool:
@@ -304,65 +323,30 @@ def _jpeg_pieces(data: bytes) -> tuple[list[bytes], int]:
             begin = position
 
 
-def _scan_png(data: bytes) -> tuple[int, int, bytes]:
-    """Return width, height and the EXIF block of a PNG file; `ValueError` when it is damaged."""
-    if data[12:16] != b"IHDR":
-        raise ValueError("no IHDR")
-    width, height = struct.unpack_from(">II", data, 16)
-    position, exif = 8, b""
-    while True:
-        (length,) = struct.unpack_from(">I", data, position)
-        name, end = data[position + 4 : position + 8], position + 8 + length
-        if struct.unpack_from(">I", data, end) != (zlib.crc32(data[position + 4 : end]),):
-            raise ValueError("a chunk's checksum is wrong")
-        if name == b"eXIf":
-            exif = data[position + 8 : end]
-        if name == b"IEND":
-            return width, height, exif
-        position = end + 4
-
-
-def _decode(data: bytes, mode: int, path: Path) -> UInt8Array:
+def _decode(data: bytes, path: Path, half: bool = False, mode: str = "RGB") -> UInt8Array:
+    """Return the pixels (H, W, 3 or 4) of a file, RGB or RGBA; of a JPEG maybe at half its size."""
     kind = _kind(data)
     try:
         if kind == "HEIC":
-            return decode_heic(data, str(path))[..., ::-1]
+            return decode_heic(data, str(path))
         if kind == "PNG":
-            _check_png_data(data)
-        if kind == "TIFF":
-            data = clear_orientation(data)
-        pixels = cv2.imdecode(np.frombuffer(data, np.uint8), mode | _AS_STORED)
-        if pixels is None:
-            raise ValueError("it cannot be decoded")
+            check_png_data(data)
+        with quiet_pillow():
+            picture = _READERS[kind](io.BytesIO(data))
+            if kind == "TIFF":
+                picture.load()  # reads metadata again
+        if half:  # a JPEG decoder halves pictures almost for free
+            picture.draft("RGB", (max(picture.width // 2, 1), max(picture.height // 2, 1)))
+        if picture.mode.startswith("I"):  # 16 bits of grey
+            pixels = np.repeat((np.asarray(picture) >> 8).astype(np.uint8)[..., None], 3, axis=2)
+        else:
+            pixels = np.asarray(picture if picture.mode == mode else picture.convert(mode))
         if kind == "JPEG" and _loses_data(data, pixels):
-            raise ValueError(_MISSING)
-    except (struct.error, IndexError, ValueError, cv2.error) as error:
+            raise ValueError("some of its picture data is missing")
+    except DAMAGE as error:
         reason = str(error).partition("\n")[0]
         raise FormatError(f"{path}: damaged {kind} file ({reason}); save it again") from error
-    return pixels  # type: ignore[return-value]  # uint8, or uint16 for IMREAD_UNCHANGED
-
-
-def _check_png_data(data: bytes) -> None:
-    """Raise `ValueError` when a PNG file's packed data is not of the size of its picture."""
-    width, height, depth, colour = struct.unpack_from(">IIBB", data, 16)
-    interlaced = data[28] != 0
-    row = -(-width * depth * _CHANNELS.get(colour, 4) // 8)
-    least = height * (row + (not interlaced))  # each row has a filter byte, interlaced ones more
-    most = height * (1 + 8 * width) + 8 * (height + 8)  # 16 bit RGBA, a filter byte a row and pass
-    inflate, position, found = zlib.decompressobj(), 8, 0
-    while data[position + 4 : position + 8] != b"IEND":
-        (length,) = struct.unpack_from(">I", data, position)
-        if data[position + 4 : position + 8] == b"IDAT":
-            packed = data[position + 8 : position + 8 + length]
-            try:
-                found += len(inflate.decompress(packed, most + 1 - found))
-            except zlib.error as error:
-                raise ValueError(f"its picture data cannot be unpacked: {error}") from error
-            if found > most:
-                raise ValueError("it unpacks to more than its picture holds")
-        position += 12 + length
-    if found < least or not inflate.eof:
-        raise ValueError(_MISSING)
+    return pixels
 
 
 def _upright(image: UInt8Array, orientation: int) -> UInt8Array:

@@ -6,7 +6,7 @@ that the guides were made from: a recipe whose `orient` is wrong everywhere agre
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Self
 
 import cv2
@@ -18,6 +18,7 @@ from hairkit.types.camera import Camera
 from hairkit.types.groom import Groom
 from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap, angle_between
+from hairkit.types.strands import Strands
 
 HEIGHT, FINER = 240, 3
 """Height in pixels at which guides and photos are compared, and how many times as fine the picture
@@ -34,6 +35,8 @@ PIECES, GUIDE_RADIUS, EDGE = 39, 0.003, 3
 taken off the hair: its edge has the direction of the outline."""
 POINTS = 4 * PIECES + 1
 """Points of a guide that hide what is behind them; every fourth is the end of a piece."""
+AT_ONCE = 4096
+"""Guides whose pieces are looked for at a time."""
 BESIDE = 9
 """Pixels, twice of which half a guide may lie beside the hair of a mask."""
 LOCK, LEAST_LOCK, LOCK_SHARE, USUAL_GUIDES = 0.01, 0.004, 0.25, 600
@@ -138,6 +141,17 @@ def share_oriented(found: OrientationMap, shown: PhotoHair) -> float:
     return share_of(right[shown.judged].sum(), shown.judged.sum())
 
 
+def with_pieces(groom: Groom) -> Groom:
+    """Return the groom with `POINTS` points on every guide; some guides are resampled at a time."""
+    points, offsets, count = groom.strands.points, groom.strands.offsets, len(groom.strands)
+    fine = []
+    for some in (offsets[k : k + AT_ONCE + 1] for k in range(0, count, AT_ONCE)):
+        part = Strands(points[some[0] : some[-1]], some - some[0])
+        fine.append(part.resampled(POINTS).points)
+    strands = Strands(np.concatenate(fine), np.arange(count + 1) * POINTS)
+    return replace(groom, strands=strands)
+
+
 def _visible(
     groom: Groom, camera: Camera, surface: Float32Array
 ) -> tuple[Int64Array, Float32Array]:
@@ -146,6 +160,20 @@ def _visible(
     The way of a wave is that of its axis: from half a pitch before a piece to half a pitch behind.
     """
     points = groom.strands.points.reshape(-1, POINTS, 3)[:, :: (POINTS - 1) // PIECES]
+    around, pitch = np.zeros((len(points), 1), np.int64), groom.material.curl_pitch
+    if pitch > 0:
+        half = PIECES * pitch / (2 * np.maximum(groom.strands.lengths(), 1e-9))
+        around[:, 0] = np.rint(half)
+    rows = (slice(k, k + AT_ONCE) for k in range(0, len(points), AT_ONCE))
+    parts = [_visible_pieces(points[some], around[some], camera, surface) for some in rows]
+    places, ways = map(np.concatenate, zip(*parts, strict=True))
+    return places, ways
+
+
+def _visible_pieces(
+    points: Float32Array, around: Int64Array, camera: Camera, surface: Float32Array
+) -> tuple[Int64Array, Float32Array]:
+    """Return the same of ends of pieces (S, M, 3); ways are over (S, 1) pieces to both sides."""
     ends = camera.project(points)
     middle = ((ends[:, :-1] + ends[:, 1:]) / 2).reshape(-1, 2)
     places = np.nan_to_num(np.floor(middle), nan=-1).astype(np.int64)
@@ -154,8 +182,6 @@ def _visible(
     column, row = (places * inside[:, None]).T
     depth = camera.depth((points[:, :-1] + points[:, 1:]) / 2).ravel()
     seen = inside & (depth <= surface[row, column] + HEAD_TOLERANCE)
-    half = PIECES * groom.material.curl_pitch / (2 * np.maximum(groom.strands.lengths(), 1e-9))
-    around = np.rint(half).astype(np.int64)[:, None]
     first = np.maximum(np.arange(PIECES) - around, 0)
     last = np.minimum(np.arange(1, PIECES + 1) + around, PIECES)
     strand = np.arange(len(ends))[:, None]

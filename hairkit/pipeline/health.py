@@ -16,13 +16,14 @@ import numpy as np
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.cameras.depth_raster import HEAD_TOLERANCE, SPLAT_CELLS, head_depth, point_depth
 from hairkit.cameras.landmark_equations import steep_faces
+from hairkit.field.cell_shells import dense_surface
 from hairkit.field.growth_prior import PARTED_HAIR
 from hairkit.pipeline.drawn_hair import (
-    POINTS,
     PhotoHair,
     compare_drawing,
     share_of,
     share_oriented,
+    with_pieces,
 )
 from hairkit.pipeline.figure import AMBER, GREEN, RED, Figure, Limits
 from hairkit.types.camera import Camera
@@ -234,15 +235,12 @@ def assess_masks(masks: Sequence[Mask], scene: Scene) -> tuple[Figure, ...]:
 
 def assess_hull(hull: Hull, masks: Sequence[Mask], scene: Scene) -> tuple[Figure, ...]:
     """Return how well the hull of all views explains the hair of each: the mean and the worst."""
-    inside, overlap = (
-        dict(zip(scene.names, column, strict=True))
-        for column in np.transpose(
-            [
-                compare_hull(hull, mask, camera, scene)
-                for mask, camera in zip(masks, scene.cameras, strict=True)
-            ]
-        )
-    )
+    cells = dense_surface(hull), SPLAT_CELLS * hull.grid.spacing
+    views = [
+        compare_hull(*cells, mask, camera, scene)
+        for mask, camera in zip(masks, scene.cameras, strict=True)
+    ]
+    inside, overlap = (dict(zip(scene.names, part, strict=True)) for part in np.transpose(views))
     worst = min(inside, key=lambda name: inside[name])
     apart = min(overlap, key=lambda name: overlap[name])
     mean = float(np.mean(list(overlap.values())))
@@ -258,8 +256,10 @@ def assess_hull(hull: Hull, masks: Sequence[Mask], scene: Scene) -> tuple[Figure
     )  # fmt: skip
 
 
-def compare_hull(hull: Hull, mask: Mask, camera: Camera, scene: Scene) -> tuple[float, float]:
-    """Return two shares of one view, of the hull drawn into it.
+def compare_hull(
+    surface: Float32Array, radius: float, mask: Mask, camera: Camera, scene: Scene
+) -> tuple[float, float]:
+    """Return two shares of one view, of the hull drawn into it: its surface as discs.
 
     Returns
     -------
@@ -272,7 +272,7 @@ def compare_hull(hull: Hull, mask: Mask, camera: Camera, scene: Scene) -> tuple[
     size = round(RASTER_HEIGHT * camera.width / camera.height), RASTER_HEIGHT
     small = camera.resized(*size)
     labels = np.asarray(cv2.resize(mask.labels, size, interpolation=cv2.INTER_NEAREST))
-    depth = point_depth(small, hull.grid.centres_of(hull.dense), SPLAT_CELLS * hull.grid.spacing)
+    depth = point_depth(small, surface, radius)
     head = head_depth(scene.head, small) + np.float32(HEAD_TOLERANCE)
     drawn, hair = np.isfinite(depth), labels == HAIR
     shown = drawn & (depth < head) & ~((labels == PERSON) & np.isinf(head))
@@ -344,7 +344,7 @@ def assess_drawing(shown: Sequence[PhotoHair], scene: Scene, groom: Groom) -> tu
 
     Directions of steep curls are not judged: their coils are not where those of the photos are.
     """
-    names, groom = scene.names, replace(groom, strands=groom.strands.resampled(POINTS))
+    names, groom = scene.names, with_pieces(groom)
     views = [compare_drawing(groom, *row) for row in zip(scene.cameras, shown, strict=True)]
     steep = groom.material.curl_radius * 2 * np.pi > groom.material.curl_pitch
     if not steep:

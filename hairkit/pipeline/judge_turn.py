@@ -14,7 +14,7 @@ from typing import Self
 import numpy as np
 
 from hairkit.cameras.camera_search import Fit
-from hairkit.cameras.turn_fit import TurnFit, TurnOptions
+from hairkit.cameras.turn_fit import Silhouettes, TurnFit, TurnOptions
 from hairkit.types.capture import Capture
 from hairkit.types.head import Head
 from hairkit.types.mask import Mask
@@ -64,8 +64,9 @@ def judge_turn(
     fewest = min(int(each.above.sum()) for each in tried)
     told = (0.0, *(other.margin - 1 for other in turn.others))
     freer = [FREER * (int(each.above.sum()) - fewest) for each in tried]
+    seen = Silhouettes.of(masks, head, OPTIONS)
     begun = [
-        _Cameras.of(capture, masks, head, each, sum(prior)).refined(COARSE)
+        _Cameras.of(capture, masks, head, each, seen, sum(prior)).refined(COARSE)
         for each, *prior in zip(tried, told, freer, strict=True)
     ]
     begun.sort(key=lambda cameras: cameras.cost)
@@ -96,11 +97,19 @@ class _Cameras:
 
     @classmethod
     def of(
-        cls, capture: Capture, masks: Sequence[Mask], head: Head, turn: Turnaround, prior: float
+        cls,
+        capture: Capture,
+        masks: Sequence[Mask],
+        head: Head,
+        turn: Turnaround,
+        seen: Silhouettes,
+        prior: float,
     ) -> Self:
-        """Return the nominal cameras of an arrangement."""
+        """Return the nominal cameras of an arrangement; `seen` is what all masks show."""
         ordered = tuple(masks[i] for i in turn.order)
-        problem = TurnFit.of(capture.arranged(turn), ordered, head, OPTIONS)
+        problem = TurnFit.of(
+            capture.arranged(turn), ordered, head, OPTIONS, seen.arranged(turn.order)
+        )
         return cls(turn, problem, problem.start(flat=False), prior)
 
     @property

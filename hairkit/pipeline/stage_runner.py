@@ -97,9 +97,7 @@ class StageRunner:
         def ask(values: dict[str, Any]) -> _Result:
             return self.recipe.ask(self.manager, stage, **fields, **values)
 
-        result = steps.run(ask, 0, "", arguments)
-        give_back_memory()
-        return result
+        return steps.run(ask, 0, "", arguments)
 
     def derive(
         self, stage: Stage[_Result], make: Callable[..., _Result], **arguments: Given[Any]
@@ -193,6 +191,7 @@ class _Steps:
         runner, stage = self._runner, self._stage
         runner.log.stepped(stage.name)
         if last:
+            give_back_memory()
             seconds = time.perf_counter() - (self._began or 0.0)
             runner.log.finished(stage.name, seconds, self._reused)
             whole = tuple(self._results) if len(self._results) > 1 else self._results[0]

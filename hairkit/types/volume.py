@@ -14,6 +14,8 @@ from hairkit.errors import DataError
 from hairkit.storage import Stored
 from hairkit.types.torso_shape import TorsoShape
 
+SAMPLED_AT_ONCE = 2**17
+"""Points at which a grid is sampled at a time."""
 MAX_CELLS = 400**3
 """Largest number of cells a grid may have."""
 
@@ -53,16 +55,20 @@ class VoxelGrid(Stored):
 
     def centres(self) -> Float32Array:
         """Return the cell centres, (X, Y, Z, 3) float32, metres."""
-        axes = [self.origin[i] + (np.arange(self.shape[i]) + 0.5) * self.spacing for i in range(3)]
-        return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).astype(np.float32)
+        return np.stack(np.meshgrid(*self.axes(), indexing="ij"), axis=-1)
+
+    def axes(self) -> list[Float32Array]:
+        """Return where cell centres lie along x, y and z, metres."""
+        steps = [np.arange(count) + 0.5 for count in self.shape]
+        axes = zip(self.origin, steps, strict=True)
+        return [(start + along * self.spacing).astype(np.float32) for start, along in axes]
 
     def centres_of(self, cells: BoolArray) -> Float32Array:
         """Return the centres (N, 3) of the cells that a mask (X, Y, Z) marks, in C order."""
         index = np.nonzero(cells)
         result = np.empty((len(index[0]), 3), np.float32)
-        for i, along in enumerate(index):
-            axis = self.origin[i] + (np.arange(self.shape[i]) + 0.5) * self.spacing
-            result[:, i] = axis.astype(np.float32)[along]
+        for i, (axis, along) in enumerate(zip(self.axes(), index, strict=True)):
+            result[:, i] = axis[along]
         return result
 
     def index_from_head(self, points: npt.ArrayLike) -> Float64Array:
@@ -79,6 +85,9 @@ class VoxelGrid(Stored):
 
         Outside the grid the nearest border value holds.
         """
+        if len(at := np.asarray(points)) > SAMPLED_AT_ONCE:  # what is computed of each is large
+            parts = (at[k : k + SAMPLED_AT_ONCE] for k in range(0, len(at), SAMPLED_AT_ONCE))
+            return np.concatenate([self.sample(values, part) for part in parts])
         index = np.clip(self.index_from_head(points), 0, np.array(self.shape) - 1)
         low = np.minimum(index.astype(np.int64), np.maximum(np.array(self.shape) - 2, 0))
         t = (index - low).astype(np.float32).T

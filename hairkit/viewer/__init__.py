@@ -7,7 +7,6 @@ and the window only passes events on and shows the result.
 * `actions`: the table of actions, presets and scripts
 * `brushing`: a brush over a groom, and its strokes
 * `draw`: drawing on the GPU or the CPU
-* `head_adjustment`: manual alignment of the head with the photos
 * `head_motion`: shakes and turns of the head
 * `layers`: photos, masks, orientation, hull and field lines as drawable layers
 * `orbit_camera`: the camera that orbits a target

@@ -99,17 +99,14 @@ class Layers:
         scene = self._read(self.last.scene)
         return {} if scene is None else dict(zip(scene.names, scene.cameras, strict=True))
 
-    def billboards(
-        self, layer: str, cameras: dict[str, Camera] | None = None
-    ) -> dict[str, Billboard]:
-        """Return the pictures of a layer, by view name, in front of their `cameras` (as found)."""
-        cameras = self.cameras if cameras is None else cameras
+    def billboards(self, layer: str) -> dict[str, Billboard]:
+        """Return the pictures of a layer, by view name, in front of their cameras."""
         pictures = {"photos": self._photos, "masks": self._masks, "orientation": self._angles}
         found = pictures[layer]()
         return {
-            name: Billboard(_picture_corners(cameras[name]), image)
+            name: Billboard(_picture_corners(self.cameras[name]), image)
             for name, image in found.items()
-            if name in cameras
+            if name in self.cameras
         }
 
     def frusta(self) -> LineSet:

@@ -69,7 +69,6 @@ class Preview:
         self._drawn: tuple[object, object] = (None, None)
         self._kept: dict[str, list[str]] = {}
         self._lines: dict[str, LineSet | None] = {}
-        self._places: dict[str, object] = {}
         self._photo: tuple[object, UInt8Array] | None = None
         self._still = Still()
         self._pictures = 0
@@ -252,11 +251,11 @@ class Preview:
         for layer in BILLBOARDS:
             if layer not in session.shown.layers:
                 continue
-            if layer not in self._kept or self._places.get(layer) is not session.adjusted:
-                billboards = session.layers.billboards(layer, session.photo_cameras)
+            if layer not in self._kept:
+                billboards = session.layers.billboards(layer)
                 for name, board in billboards.items():
                     frame_renderer.upload_billboard(f"{layer}/{name}", board)
-                self._kept[layer], self._places[layer] = list(billboards), session.adjusted
+                self._kept[layer] = list(billboards)
             only = session.shown.through
             names += [f"{layer}/{n}" for n in self._kept[layer] if only is None or n == only]
         return tuple(names)
@@ -284,7 +283,7 @@ class Preview:
         if wipe is None or name is None or name not in session.layers.photos:
             return
         width, height = frame_renderer.framebuffer.size
-        now, taken = session.camera((width, height)), session.photo_cameras[name]
+        now, taken = session.camera((width, height)), session.layers.cameras[name]
         scale = now.focal / taken.focal
         left, top = np.rint(now.centre - taken.centre * scale).astype(int).tolist()
         size = round(taken.width * scale), round(taken.height * scale)

@@ -26,7 +26,6 @@ from hairkit.types.edits import Brush
 from hairkit.types.groom import Groom
 from hairkit.viewer.brushing import NAMES, Brushing
 from hairkit.viewer.draw.hair_data import HairBody, choose_shares, split_guides
-from hairkit.viewer.head_adjustment import EDGE, Adjustment, Rerun
 from hairkit.viewer.head_motion import HeadMotion
 from hairkit.viewer.layers import Layers
 from hairkit.viewer.orbit_camera import OrbitView
@@ -129,11 +128,6 @@ class Session:
         self.screenshots: list[Path] = []
         """Files to write the next picture to."""
         self.recorder: Recorder | None = None
-        self.adjustment: Adjustment | None = None
-        self.adjusted: dict[str, Camera] | None = None
-        """Cameras of the photos during the manual alignment."""
-        self.rerun: Rerun | None = None
-        """The running reconstruction."""
         self.covered = 0
         """Pixels at the right edge of the picture that the panel covers."""
         self.max_seconds: float | None = None
@@ -210,53 +204,13 @@ class Session:
         """Return the camera of the picture, world frame."""
         width, height = size or self.size
         through, free = self.shown.through, self._free(width)
-        if through is not None and through in self.photo_cameras:
-            return replace(fit_camera(self.photo_cameras[through], free, height), width=width)
+        if through is not None and through in self.layers.cameras:
+            return replace(fit_camera(self.layers.cameras[through], free, height), width=width)
         return self.view.camera(width, height, free)
 
     def _free(self, width: int) -> int:
         """Return how many columns of a picture of that width the panel leaves free."""
         return max(width - round(self.covered * width / self.size[0]), 1)
-
-    @property
-    def photo_cameras(self) -> dict[str, Camera]:
-        """Cameras of the photos by view name: reconstructed, or of the manual alignment."""
-        return self.layers.cameras if self.adjusted is None else self.adjusted
-
-    def adjust(self, on: bool) -> None:
-        """Start or leave the manual alignment of the head; raises `InputError` without photos."""
-        before = None if self.adjustment is None else self.adjustment.before
-        self.adjustment, self.adjusted = None, None
-        if before is not None:  # restore the display settings
-            self.paused, self.shown.opacity = before.paused, before.opacity
-            self.shown.through = before.through
-            if not before.photos:
-                self.shown.layers.discard("photos")
-        if on:
-            capture, head = self.layers.take_capture(EDGE), self.opened.groom.head
-            self.adjustment = Adjustment.of(self.manager, capture, head, self.layers.cameras)
-            self.update_photo_cameras()
-        elif self.shown.through not in self.layers.cameras:
-            self.shown.through = None
-
-    def update_photo_cameras(self) -> None:
-        """Update the cameras of the photos from the alignment."""
-        if self.adjustment is not None:
-            self.adjusted = self.adjustment.cameras()
-
-    def poll_rerun(self) -> None:
-        """Show the progress of a reconstruction; load its result when it ends."""
-        if self.rerun is None:
-            return
-        self.message = f"reconstructing: {self.rerun.progress}"
-        if self.rerun.running:
-            return
-        rerun, self.rerun = self.rerun, None
-        rerun.wait()
-        rerun.check()
-        self.adjust(False)
-        self.reload()
-        self.message = "reconstructed from the aligned head"
 
     def advance(self, seconds: float) -> None:
         """Simulate `seconds`, unless paused or under a brush."""
@@ -341,7 +295,6 @@ class Session:
         self.drawn = replace(self._guides, strands=strands)
         self.simulation = TunableSimulator(self.manager, self.drawn, self._simulator)
         self.motion = HeadMotion(opened.groom.head.joints[1].astype(np.float64))
-        self.adjustment, self.adjusted = None, None
         self.layers = Layers(self.manager, opened.results, self._capture)
         self.grabbed_lock = self.picked = self.brushing = None
         self.steps, self._time_debt = 0, 0.0

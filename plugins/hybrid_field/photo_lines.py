@@ -49,7 +49,7 @@ def lift_photo_lines(
     cameras: Sequence[Camera], masks: Sequence[Mask], fused: FusedViews, options: Options
 ) -> Strands:
     """Return lines that follow the 2D orientation in each photo, lifted to the hull's front."""
-    found = []
+    found: list[Strands] = []
     views = zip(cameras, masks, fused.orientations, fused.fronts, strict=True)
     for camera, mask, oriented, front in views:
         weight = (oriented.confidence * mask.hair).astype(np.float32)
@@ -61,9 +61,17 @@ def lift_photo_lines(
         parallel_for(
             _follow_photo, len(rows), photo, rows, columns, lines, counts, min_chunk=MIN_LINES
         )
-        found.append(lift_lines(camera, lines, counts))
-    points, counts, lengths = map(np.concatenate, zip(*found, strict=True))
-    return _resample_lines(points, counts, lengths)
+        # one by one: a line has a point for each pixel, many times as many as it keeps
+        found.append(_resample_lines(*lift_lines(camera, lines, counts)))
+    return join_lines(found)
+
+
+def join_lines(parts: Sequence[Strands]) -> Strands:
+    """Return the lines of all parts, one after the other."""
+    counts = np.concatenate([part.counts for part in parts])
+    return Strands(
+        np.concatenate([part.points for part in parts]), np.concatenate([[0], np.cumsum(counts)])
+    )
 
 
 def lift_lines(

@@ -28,6 +28,7 @@ from .photo_lines import (
     TensorVolume,
     agreeing,
     join,
+    join_lines,
     lift_photo_lines,
 )
 
@@ -87,11 +88,9 @@ def find_segments(
     lines = lift_photo_lines(cameras, masks, fused, options)
     lines = agreeing(lines, hull, volume, AGREEMENT_DEG)
     inner = lines_through_cells(hull, volume, certainty, options.longest)
-    points = np.concatenate([lines.points, inner.points])
-    offsets = np.concatenate([lines.offsets, inner.offsets[1:] + lines.offsets[-1]])
-    if len(offsets) == 1:
-        return Strands(points, offsets)
-    return orient_segments(Strands(points, offsets), hull, way)
+    every = join_lines([lines, inner])
+    del lines, inner
+    return orient_segments(every, hull, way) if len(every) else every
 
 
 def lines_through_cells(
@@ -106,7 +105,7 @@ def lines_through_cells(
     cells = cells[cells.sum(axis=1) % 2 == 0]
     seeds = hull.grid.origin + (cells + 0.5) * hull.grid.spacing
     half = max(int(longest / STEP / 2), FEWEST)
-    lines = np.zeros((len(seeds), 2 * half + 1, 3))
+    lines = np.zeros((len(seeds), 2 * half + 1, 3), np.float32)
     counts = np.zeros(len(seeds), np.int64)
     inside = (hull.dense & (sure > RUN_ON * CONFIDENT * best))[..., None].astype(np.float32)
     tensors = TensorVolume(hull.grid.origin, hull.grid.spacing, volume)
@@ -115,7 +114,7 @@ def lines_through_cells(
     long = counts >= FEWEST
     real = np.arange(lines.shape[1])[None] < counts[long, None]
     offsets = np.concatenate([[0], np.cumsum(counts[long])])
-    return Strands(lines[long][real].astype(np.float32), offsets)
+    return Strands(lines[long][real], offsets)
 
 
 @compiled_with(allocates=True)
@@ -125,7 +124,7 @@ def _follow_cells(
     tensors: TensorVolume,
     inside: Float32Array,
     seeds: Float64Array,
-    lines: Float64Array,
+    lines: Float32Array,
     counts: Int64Array,
 ) -> None:
     """Write lines `first` to `last` from seeds (N, 3) both ways into lines (N, M, 3), counts (N,).
@@ -136,9 +135,11 @@ def _follow_cells(
     tensor, way = np.empty(6), np.empty(3)
     for s in range(first, last):
         sample_at(tensors.origin, tensors.spacing, tensors.values, seeds[s], tensor)
-        if not principal_direction(tensor, FIRST_WAY, way):
+        for axis in range(3):
+            way[axis] = FIRST_WAY[axis]
+        if not principal_direction(tensor, way, way):
             continue
-        back, ahead = np.empty((half, 3)), np.empty((half, 3))
+        back, ahead = np.empty((half, 3), np.float32), np.empty((half, 3), np.float32)
         before = _follow_tensors(tensors, inside, seeds[s], way, -1.0, back)
         after = _follow_tensors(tensors, inside, seeds[s], way, 1.0, ahead)
         counts[s] = join(back, before, ahead, after, lines[s])
@@ -151,7 +152,7 @@ def _follow_tensors(
     seed: Float64Array,
     way: Float64Array,
     sign: float,
-    line: Float64Array,
+    line: Float32Array,
 ) -> int:
     """Write points (M, 3) from seed (3,) along sign times way (3,), and return their number."""
     p, d = np.empty(3), np.empty(3)
@@ -207,8 +208,8 @@ def orient_segments(segments: Strands, hull: Hull, way: Way) -> Strands:
 
 def _reverse(segments: Strands, turned: BoolArray) -> Strands:
     """Return the segments, those of `turned` (S,) with their points in reverse order."""
-    owner = segments.strand_of_point
-    rank = np.arange(len(segments.points))
-    mirrored = segments.offsets[:-1][owner] + segments.offsets[1:][owner] - 1 - rank
-    rows = np.where(turned[owner], mirrored, rank)
-    return Strands(segments.points[rows], segments.offsets)
+    counts, ends = segments.counts, segments.offsets[:-1] + segments.offsets[1:] - 1
+    rows = np.flatnonzero(np.repeat(turned, counts))
+    points = segments.points.copy()
+    points[rows] = segments.points[np.repeat(ends[turned], counts[turned]) - rows]
+    return Strands(points, segments.offsets)

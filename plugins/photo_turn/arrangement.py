@@ -130,6 +130,15 @@ class Evidence:
         alike, mirrored = (scale * np.nan_to_num(p - u) for p, u in zip(bent, usual, strict=True))
         return NEIGHBOUR_SHARE * alike, mirrored
 
+    @cached_property
+    def pair_tables(self) -> tuple[Float64Array, Float64Array]:
+        """Return `pair_costs` as tables (V, V), 0 on the diagonal."""
+        tables = np.zeros((2, len(self.yaw_deg), len(self.yaw_deg)))
+        for table, costs in zip(tables, self.pair_costs, strict=True):
+            table[self.pairs] = costs
+            table += table.T
+        return tables[0], tables[1]
+
     @property
     def weight(self) -> float:
         """Return the weight of a photo: many photos tell no more than those of a usual turn."""
@@ -155,12 +164,18 @@ def wrap(angle_deg: Float64Array) -> Float64Array:
     return wrapped
 
 
-def measure_cost(azimuth_deg: Float64Array, evidence: Evidence) -> Float64Array:
-    """Return the costs (B,) of arrangements (B, V) of all photos on one ring, degrees."""
+def measure_cost(
+    azimuth_deg: Float64Array, evidence: Evidence, outlines: Float64Array | None = None
+) -> Float64Array:
+    """Return the costs (B,) of arrangements (B, V) of all photos on one ring, degrees.
+
+    `outlines` (B,) is the cost of outlines where it is known.
+    """
     angle = np.radians(azimuth_deg)
     across, ahead = np.sin(angle), np.cos(angle)
     cost = _face_cost(azimuth_deg, evidence) + _step_cost(azimuth_deg, evidence.in_time)
-    cost += _outline_cost(across, ahead, evidence) + _skin_cost(across, ahead, evidence)
+    cost += _outline_cost(across, ahead, evidence) if outlines is None else outlines
+    cost += _skin_cost(across, ahead, evidence)
     return cost + _looks_cost(azimuth_deg, evidence)
 
 
@@ -202,6 +217,59 @@ def _outline_cost(across: Float64Array, ahead: Float64Array, evidence: Evidence)
     gap = across[:, first] * across[:, second] + ahead[:, first] * ahead[:, second]
     near, opposite = np.exp(NEAR * (gap - 1)), np.exp(OPPOSITE * (-gap - 1))
     return np.asarray(near @ alike + opposite @ mirrored, np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class OutlineTable:
+    """The cost of outlines of one arrangement, pair by pair: most pairs stay when one photo moves.
+
+    `_outline_cost` of M arrangements of V photos takes M V^2 exponentials, this V^2 + M V.
+    """
+
+    evidence: Evidence
+    azimuth: Float64Array
+    """(V,) radians."""
+    near: Float64Array
+    """(V, V) how near the views are to each other."""
+    opposite: Float64Array
+    """(V, V) how near they are to opposite."""
+
+    @classmethod
+    def of(cls, azimuth_deg: Float64Array, evidence: Evidence) -> Self:
+        """Return the table of an arrangement (V,)."""
+        azimuth = np.radians(azimuth_deg)
+        return cls(evidence, azimuth, *_nearness(azimuth[:, None] - azimuth))
+
+    @cached_property
+    def of_photos(self) -> Float64Array:
+        """Return the cost (V,) of each photo with all others: twice that of the arrangement."""
+        alike, mirrored = self.evidence.pair_tables
+        return np.asarray((alike * self.near + mirrored * self.opposite).sum(axis=1), np.float64)
+
+    def moved(self, photo: int, moves_deg: Float64Array) -> Float64Array:
+        """Return the costs (M,) of arrangements with one photo moved by so many degrees."""
+        alike, mirrored = (table[photo] for table in self.evidence.pair_tables)
+        places = self.azimuth[photo] + np.radians(moves_deg)
+        near, opposite = _nearness(places[:, None] - self.azimuth)
+        rest = self.of_photos.sum() / 2 - self.of_photos[photo]
+        return np.asarray(rest + near @ alike + opposite @ mirrored, np.float64)
+
+    def swapped(self, photo: int, others: Int64Array) -> Float64Array:
+        """Return the costs (M,) of arrangements with one photo in the place of each of others."""
+        change = np.zeros(len(others))
+        for table, nearness in zip(
+            self.evidence.pair_tables, (self.near, self.opposite), strict=True
+        ):
+            parts = (table[photo] - table[others]) * (nearness[others] - nearness[photo])
+            parts[:, photo] = parts[np.arange(len(others)), others] = 0  # the two as before
+            change += parts.sum(axis=1)
+        return np.asarray(self.of_photos.sum() / 2 + change, np.float64)
+
+
+def _nearness(gap: Float64Array) -> tuple[Float64Array, Float64Array]:
+    """Return how near views this many radians apart are to each other, and to opposite."""
+    along = np.cos(gap)
+    return np.exp(NEAR * (along - 1)), np.exp(OPPOSITE * (-along - 1))
 
 
 def _looks_cost(azimuth: Float64Array, evidence: Evidence) -> Float64Array:

@@ -14,7 +14,7 @@ import numpy as np
 from hairkit.arrays import BoolArray, Float64Array, Int64Array
 from hairkit.types.turnaround import moved_photos
 
-from .arrangement import TURN_OF, Evidence, Placed, measure_cost, wrap
+from .arrangement import TURN_OF, Evidence, OutlineTable, Placed, measure_cost, wrap
 
 STARTS, STARTS_ABOVE = 6, 0
 """Random orders from which the search starts, and from which it does with a photo left out."""
@@ -144,14 +144,21 @@ class Search:
         """Return the arrangement (R,) to which moves lead, each to the cheapest place."""
         cost = float(measure_cost(azimuth[None], evidence)[0])
         free = np.nonzero(~self.fixed)[0]
+        table = OutlineTable.of(azimuth, evidence)
         for _ in range(ROUNDS):
             before = cost
             for photo in (*free, None):
-                trials = self._mirrored(azimuth) if photo is None else self._moved(azimuth, photo)
-                costs = measure_cost(trials, evidence)
+                if photo is None:
+                    trials = self._mirrored(azimuth)
+                    costs = measure_cost(trials, evidence)
+                else:
+                    trials = self._moved(azimuth, photo)
+                    parts = table.moved(photo, MOVES_DEG), table.swapped(photo, free[free != photo])
+                    costs = measure_cost(trials, evidence, np.concatenate(parts))
                 least = int(costs.argmin())
                 if costs[least] < cost - GAIN:
                     azimuth, cost = trials[least], float(costs[least])
+                    table = OutlineTable.of(azimuth, evidence)
             if cost == before:
                 break
         return azimuth

@@ -66,7 +66,7 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
     "robustness": ({}, ["--grooms", "2"]),
     "render": ({"GUIDES": 40}, ["--strands", "60", "--points", "8", "--size", "60x80"]),
     "scaling": (
-        {"PHOTOS": 8, "STEPS": {"guides": (20, 40)}},
+        {"PHOTOS": 8, "STEPS": {"guides": (20, 40), "file pixels": (240, 300)}},
         ["CAPTURES/short", "--rounds", "1", "-o", "CAPTURES/growth.png"],
     ),
     "segmentation": ({}, ["CAPTURES", "--plugin", "auto_matte"]),

@@ -13,6 +13,7 @@ from hairkit.arrays import Float64Array
 from hairkit.cameras.landmark_equations import CameraArrays
 from hairkit.cameras.outlines import Outlines
 from hairkit.cameras.silhouette_coherence import CAP, REACH, coherence
+from hairkit.cameras.turn_fit import Silhouettes, TurnOptions
 
 MIDDLE = np.full(8, 0.7)
 
@@ -134,3 +135,15 @@ def test_a_picture_full_of_hair_has_no_outline() -> None:
     outlines = Outlines.of([Mask(np.full((40, 30), 255, np.uint8), True)], 10)
     assert len(outlines.points) == 0
     assert np.isfinite(outlines.fields).all()
+
+
+def test_silhouettes_in_another_order_are_those_of_masks_in_that_order(bust: Turntable) -> None:
+    """Fields, contour points and bare outlines move with their views."""
+    order, options = np.roll(np.arange(len(bust.masks))[::-1], 2), TurnOptions()
+    moved = Silhouettes.of(bust.masks, bust.head, options).arranged(order)
+    wanted = Silhouettes.of(tuple(bust.masks[k] for k in order), bust.head, options)
+    for name in ("fields", "points", "views"):
+        assert np.array_equal(getattr(moved.outlines, name), getattr(wanted.outlines, name))
+    assert moved.cranium is not None
+    assert wanted.cranium is not None
+    assert np.array_equal(moved.cranium.fields, wanted.cranium.fields)

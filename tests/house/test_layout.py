@@ -262,7 +262,7 @@ def test_data_files_are_in_the_wheel() -> None:
 
 def test_every_dependency_is_used() -> None:
     """What hairkit depends on is imported by a file of hairkit or of its plugins."""
-    modules = {"opencv-python-headless": "cv2", "ai-edge-litert": "ai_edge_litert"}
+    modules = {"opencv-python-headless": "cv2", "ai-edge-litert": "ai_edge_litert", "pillow": "PIL"}
     used = {name.partition(".")[0] for path in SOURCES + PLUGINS for name in imported(path)}
     names = [re.split(r"[^\w-]", line)[0] for line in pyproject()["project"]["dependencies"]]
     assert [name for name in names if modules.get(name, name) not in used] == []

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from PIL import Image, ImageFile
 
 from hairkit.errors import FormatError, InputError
 from hairkit.io.photos import MAX_PIXELS, read_header, read_photo
@@ -121,13 +122,13 @@ def test_a_bomb_is_refused_before_it_is_decoded(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The size in the header decides; the decoder is never asked."""
-    monkeypatch.setattr(cv2, "imdecode", lambda *_: pytest.fail("it was decoded"))
+    monkeypatch.setattr(ImageFile.ImageFile, "load", lambda *_: pytest.fail("it was decoded"))
     tiff = encode(".tif", scene_picture())
     webp = webp_with_exif(encode(".webp", scene_picture()), b"", (2**24, 2**24))
     large = tag_of_tiff(tag_of_tiff(tiff, 256, 60_000), 257, 60_000)
     assert MAX_PIXELS < 60_000**2
     for ending, data in ((".tif", large), (".webp", webp)):
-        with pytest.raises(InputError, match=r"pixels, expected|damaged"):
+        with pytest.raises(InputError, match="pixels"):
             read_header(put(tmp_path, ending, data))
 
 
@@ -153,10 +154,10 @@ def test_cut_and_animated_webp_is_named(tmp_path: Path) -> None:
     data = encode(".webp", scene_picture(), [cv2.IMWRITE_WEBP_QUALITY, 90])
     with pytest.raises(FormatError, match="damaged WebP"):
         read_photo(put(tmp_path, ".webp", data[:-20]))
-    moving = bytearray(webp_with_exif(data, b""))
-    moving[20] |= 2
+    frames = [Image.fromarray(picture) for picture in (scene_picture(), 255 - scene_picture())]
+    frames[0].save(tmp_path / "moving.webp", save_all=True, append_images=frames[1:])
     with pytest.raises(FormatError, match="an animation"):
-        read_photo(put(tmp_path, ".webp", bytes(moving)))
+        read_photo(tmp_path / "moving.webp")
 
 
 @given(

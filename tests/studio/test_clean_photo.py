@@ -14,9 +14,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hairkit.errors import HairkitError
-from hairkit.io.exif import Exif, read_exif
+from hairkit.io.exif import Exif, read_exif, write_exif
 from hairkit.io.photos import read_header, read_photo
-from hairkit.studio.clean_photo import clean_photo, exif_block
+from hairkit.studio.clean_photo import clean_photo
 
 SECRET = b"51 deg 30' N, 0 deg 7' W, phone of Ada"
 
@@ -30,7 +30,7 @@ def picture(kind: str) -> bytes:
 def with_secrets(exif: Exif) -> bytes:
     """Return a JPEG file with a secret in its EXIF block, a comment, another segment and behind."""
     data = picture(".jpg")
-    body = b"Exif\0\0" + exif_block(exif) + SECRET
+    body = b"Exif\0\0" + write_exif(exif) + SECRET
     segments = b"\xff\xe1" + struct.pack(">H", len(body) + 2) + body
     for marker in (b"\xff\xfe", b"\xff\xed", b"\xff\xe1"):
         segments += marker + struct.pack(">H", len(SECRET) + 2) + SECRET
@@ -76,9 +76,9 @@ def test_a_png_keeps_its_pixels_alone(tmp_path: Path) -> None:
 def test_facts_are_read_as_written(
     orientation: int, focal: int | None, length: float | None, pixels: tuple[int, int] | None
 ) -> None:
-    """`read_exif` reads what `exif_block` writes."""
+    """`read_exif` reads what `write_exif` writes."""
     facts = Exif(orientation, focal, length, None, pixels)
-    found = read_exif(exif_block(facts))
+    found = read_exif(write_exif(facts))
     assert found.orientation == orientation
     assert found.focal_35mm == focal
     assert found.pixels == pixels

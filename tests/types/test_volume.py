@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from hairkit import testing
 from hairkit.errors import InputError
+from hairkit.types import volume
 from hairkit.types.volume import (
     TENSOR_INDICES,
     VoxelGrid,
@@ -73,6 +74,16 @@ def test_sampling_stays_in_the_range(grid: VoxelGrid, seed: int) -> None:
     samples = grid.sample(values, points)
     assert samples.min() >= values.min() - 1e-6
     assert samples.max() <= values.max() + 1e-6
+
+
+def test_many_points_are_sampled_as_few_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    """However many points are sampled at a time, each has the same bytes."""
+    random = np.random.default_rng(0)
+    grid = VoxelGrid(np.zeros(3), 0.5, (4, 5, 6))
+    values, points = random.random((*grid.shape, 2), np.float32), random.uniform(0, 3, (50, 3))
+    whole = grid.sample(values, points)
+    monkeypatch.setattr(volume, "SAMPLED_AT_ONCE", 7)
+    assert np.array_equal(grid.sample(values, points), whole)
 
 
 @given(st.lists(vectors, min_size=1, max_size=5).map(np.array))

@@ -4,7 +4,6 @@ Each action is a function of a session and of named values; keys, mouse, panel a
 
 * `actions`: the actions
 * `brush`: the brushes over the hair
-* `pose`: actions that align the head with the photos
 * `presets`: simulator options saved under a name
 * `registry`: the table: names, values and keys
 * `scene`: light, backdrop, lens, the photo beside the hair

@@ -1,7 +1,7 @@
 """The actions of the viewer, with their keys: mouse, panel and scripts use them too.
 
 >>> sorted(ACTIONS)[:3]
-['adjust', 'backdrop', 'brush']
+['backdrop', 'brush', 'brush_option']
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from hairkit.errors import InputError
 from hairkit.options import OptionInfo, unknown_name
 from hairkit.stages import renamed
-from hairkit.viewer.actions import brush, pose, scene  # register their actions
+from hairkit.viewer.actions import brush, scene  # register their actions
 from hairkit.viewer.actions.presets import presets_path, read_preset, write_preset
 from hairkit.viewer.actions.registry import ACTIONS, action, bindings, check_values, perform
 from hairkit.viewer.draw.colouring import COLOURINGS
@@ -24,7 +24,7 @@ from hairkit.viewer.picking import grab_lock, nearest_hair, surface_point
 from hairkit.viewer.recording import Recorder, free_name
 from hairkit.viewer.session import MAX_TURBULENCE, MAX_WIND, Session
 
-__all__ = ["ACTIONS", "LOOKS", "bindings", "brush", "check_values", "perform", "pose", "scene"]
+__all__ = ["ACTIONS", "LOOKS", "bindings", "brush", "check_values", "perform", "scene"]
 LOOKS = {"front": (0.0, 0.0), "side": (90.0, 0.0), "back": (180.0, 0.0), "top": (0.0, 89.0)}
 """Named views: azimuth and elevation, degrees."""
 MAX_SECONDS = 3600.0
@@ -88,7 +88,7 @@ def frame(session: Session) -> None:
 @action(N={"step": 1}, B={"step": -1})
 def through(session: Session, name: str = "", step: int = 0) -> None:
     """Look through the camera of the next or previous photo, or by name."""
-    names = list(session.photo_cameras)
+    names = list(session.layers.cameras)
     if not names:
         raise InputError("no cameras of photos; open a folder that hairkit reconstruct wrote")
     if name and name not in names:

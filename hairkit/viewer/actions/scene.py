@@ -51,7 +51,7 @@ def wipe(session: Session, at: float | None = None, on: bool | None = None) -> N
         shown.wipe = None
         return
     session.layers.check("photos")
-    name = shown.through or next(iter(session.photo_cameras))
+    name = shown.through or next(iter(session.layers.cameras))
     if name not in session.layers.photos:
         raise InputError(f"the capture has no photo {name!r}; pass its folder with --capture")
     shown.through = name

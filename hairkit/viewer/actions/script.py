@@ -16,7 +16,6 @@ file = "windy.png"         # relative to --out
 
 from __future__ import annotations
 
-import time
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -33,8 +32,6 @@ from hairkit.viewer.session import Session
 
 _WRITES = ("screenshot", "record")
 _READS = ("open_file",)
-RERUN_POLL = 0.05
-"""Seconds between two looks at a running reconstruction."""
 
 
 @dataclass(frozen=True)
@@ -88,16 +85,11 @@ def play(preview: Preview, script: Script, out: Path) -> None:
             if session.recorder is not None and session.recorder not in films:
                 films.append(session.recorder)
             _advance_pending(preview)
-            while session.rerun is not None:
-                time.sleep(RERUN_POLL)
-                session.poll_rerun()
             if session.screenshots:
                 preview.frame(0.0, still=True)
             if session.finished:
                 break
     finally:
-        if session.rerun is not None:
-            session.rerun.stop()
         if session.recorder is not None:
             session.recorder.close()
         preview.written += [film.path for film in films if film.count]

@@ -21,7 +21,6 @@ from hairkit.viewer.actions.presets import preset_names, presets_path
 from hairkit.viewer.brushing import NAMES, Brushing
 from hairkit.viewer.draw.backdrop import BACKDROPS
 from hairkit.viewer.draw.colouring import COLOURINGS
-from hairkit.viewer.head_motion import AXES
 from hairkit.viewer.layers import BILLBOARDS
 from hairkit.viewer.preview import Preview
 from hairkit.viewer.session import Session
@@ -54,10 +53,6 @@ WIND_RANGES = (
 """Name, range, number format and tooltip of the sliders for the wind."""
 NOD = 15.0
 """Amplitude of the nod and tilt buttons, degrees, as of their keys."""
-MOVE_STEP = 0.002
-"""Motion of the head by a click during the alignment, metres; the keys move half as far."""
-SCALE_STEP = 1.01
-"""Factor of the head's size by a click, as by a key."""
 
 Perform = Callable[[str, Mapping[str, object]], None]
 
@@ -155,8 +150,6 @@ class Panel:
                 value = session.simulation.value(info.name)
                 _draw_option(imgui, info, value, "option", perform)
             self._preset = _draw_presets(imgui, session, self._preset, perform)
-        if session.layers.capture is not None and imgui.collapsing_header("Head in the photos"):
-            _draw_pose(imgui, session, perform)
         imgui.pop_item_width()
         imgui.end()
         imgui.render()
@@ -271,39 +264,6 @@ def _draw_brush(imgui: Any, now: Brushing | None, perform: Perform) -> None:
         for info in describe(Brush)[1:]:
             _draw_option(imgui, info, getattr(now.setting, info.name), "brush_option", perform)
         _buttons(imgui, perform, ("undo", "undo", {}), ("redo", "undo", {"by": 1}))
-
-
-def _draw_pose(imgui: Any, session: Session, perform: Perform) -> None:
-    changed, on = imgui.checkbox("align the head", session.adjustment is not None)
-    if changed:
-        perform("adjust", {"on": on})
-    if session.adjustment is None:
-        return
-    moves = (("left", "right", -1), ("right", "right", 1), ("up", "up", 1), ("down", "up", -1))
-    _buttons(
-        imgui,
-        perform,
-        *((label, "head_move", {axis: sign * MOVE_STEP}) for label, axis, sign in moves),
-        ("larger", "head_scale", {"factor": SCALE_STEP}),
-        ("smaller", "head_scale", {"factor": 1 / SCALE_STEP}),
-    )
-    turns = [(axis, sign, degrees) for axis in AXES for sign, degrees in (("-", -1.0), ("+", 1.0))]
-    _buttons(
-        imgui,
-        perform,
-        *((f"{a} {sign}", "head_turn", {"axis": a, "degrees": deg}) for a, sign, deg in turns),
-    )
-    _buttons(
-        imgui,
-        perform,
-        ("next photo", "through", {"step": 1}),
-        ("previous photo", "through", {"step": -1}),
-        ("save", "head_save", {}),
-    )
-    if imgui.button("save and reconstruct") and session.rerun is None:
-        perform("reconstruct", {})
-    if session.rerun is not None:
-        imgui.text(session.rerun.progress)
 
 
 def _draw_option(imgui: Any, info: OptionInfo, value: Any, action: str, perform: Perform) -> None:

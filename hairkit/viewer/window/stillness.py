@@ -31,7 +31,7 @@ class Stillness:
     def asleep(self, now: float) -> bool:
         """Return True where the next picture would be the last one."""
         session = self._session
-        busy = session.pending > 0 or session.screenshots or session.rerun is not None
+        busy = session.pending > 0 or session.screenshots
         if busy or session.recorder is not None:
             self._stirred = now
         if not session.paused and now - self._looked >= CHECK:

@@ -204,17 +204,15 @@ class Window:
     def _listen_for_events(self) -> None:
         """Handle mouse and keys; wait for them a little if nothing moves."""
         still = self.session.paused and not self.session.pending
-        if self.session.recorder is None and (still or self.session.rerun is not None):
+        if self.session.recorder is None and still:
             self._glfw.wait_events_timeout(IDLE)
         self._glfw.poll_events()
 
     def leave(self) -> None:
-        """Finish the recording and stop a running reconstruction."""
+        """Finish the recording."""
         logging.getLogger("hairkit").removeHandler(self._warnings)
         if self.session.recorder is not None:
             self.session.recorder.close()
-        if self.session.rerun is not None:
-            self.session.rerun.stop()
 
     def draw_hidden(self) -> None:
         """Draw a picture without showing it, so that all shaders are compiled."""
@@ -243,7 +241,7 @@ class Window:
     def _next(self, steps: Iterator[None] | None) -> Iterator[None] | None:
         """Perform the next action of a script once the last one is finished."""
         session = self.session
-        if steps is None or session.pending > 1e-9 or session.rerun is not None:
+        if steps is None or session.pending > 1e-9:
             return steps
         try:
             with renderer():
@@ -308,15 +306,7 @@ class Window:
 
     def _reload_changed(self) -> None:
         now = time.monotonic()
-        if self.session.rerun is not None:
-            try:
-                with renderer():
-                    self.session.poll_rerun()
-            except (HairkitError, OSError) as error:
-                self.session.message = one_line(error)
-            if self.session.rerun is None:  # its result is loaded already
-                self._watch_groom = FileWatcher([self.session.opened.path])
-        elif self._watched != self.session.opened.path:
+        if self._watched != self.session.opened.path:
             self._watched = self.session.opened.path
             self._watch_groom = FileWatcher([self._watched])
         elif self._watch_groom.changed(now):

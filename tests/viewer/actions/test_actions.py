@@ -13,8 +13,7 @@ from hairkit.viewer.actions.actions import ACTIONS, LOOKS, bindings, perform
 from hairkit.viewer.actions.presets import presets_path, write_preset
 from hairkit.viewer.session import STEP, Session
 
-NEEDS_RESULTS = ("layer", "through", "preset_load", "adjust", "reconstruct", "wipe")
-NEEDS_RESULTS += ("head_move", "head_turn", "head_scale", "head_save")
+NEEDS_RESULTS = ("layer", "through", "preset_load", "wipe")
 NEEDS_BRUSH = ("brush_option", "undo")
 
 

@@ -86,7 +86,7 @@ def test_a_script_run_again_gives_the_same_pictures(session: Session, tmp_path: 
     ("text", "message"),
     [
         ("steps = 3", "start each step with"),
-        ("[[steps]]\ndo = 'fly'", "step 1: no action 'fly'; valid: adjust"),
+        ("[[steps]]\ndo = 'fly'", "step 1: no action 'fly'; valid: backdrop"),
         ("[[steps]]\ndo = 'zoom'", "step 1: zoom: missing value of factor"),
         ("[[steps]]\ndo = 'wind'\nspeeed = 3", "step 1: wind: no option 'speeed'"),
         ("[[steps]]\ndo = 'wind'\nspeed = 'fast'", "step 1: wind: option speed is 'fast'"),
