@@ -41,7 +41,7 @@ from hairkit_plugins import pbd, rods
 from hairkit_plugins.pbd.simulator import PbdSimulator
 from hairkit_plugins.rods.simulator import RodSimulator
 
-from hairkit.grooming.prepare_export import dense_groom, select_strands
+from hairkit.grooming.prepare_export import dense_groom
 from hairkit.head_model.template import default_head
 from hairkit.simulation import Simulator, Surroundings, add_shakes
 from hairkit.synth import grow
@@ -230,7 +230,7 @@ def referee_speed(python: str, groom: Groom, setting: Setting, steps: int) -> Sp
 def few(groom: Groom) -> Groom:
     """Return some of the strands, evenly picked."""
     count = len(groom.strands)
-    return select_strands(groom, np.linspace(0, count - 1, min(FEW, count)).astype(int))
+    return groom.select(np.linspace(0, count - 1, min(FEW, count)).astype(int))
 
 
 def errors(scene: Groom, frames: int, python: str | None) -> dict[Way, tuple[float, float]]:

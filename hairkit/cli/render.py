@@ -16,7 +16,6 @@ from hairkit.cli.written import add_json, check_target, print_written
 from hairkit.errors import InputError
 from hairkit.grooming.densify import densify
 from hairkit.grooming.guide_weights import guide_mask
-from hairkit.grooming.prepare_export import select_strands
 from hairkit.imaging.picture_file import write_picture
 from hairkit.io.capture_reader import TURN
 from hairkit.manager import Manager
@@ -111,7 +110,7 @@ def _hair_and_head(args: argparse.Namespace) -> tuple[Groom, Strands]:
     hair = densify(groom, args.hairs, args.seed)
     if args.cache is None:
         return groom, hair
-    guides = select_strands(groom, guide_mask(groom.strands))
+    guides = groom.select(guide_mask(groom.strands))
     cache, frame = read_cache(args.cache, guides), args.frame or 0
     return pose_groom(groom, cache, frame), pose_hair(groom, hair, cache, frame)
 

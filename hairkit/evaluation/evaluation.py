@@ -46,7 +46,6 @@ from hairkit.evaluation.strand_statistics import (
 )
 from hairkit.evaluation.truth import Truth
 from hairkit.grooming.densify import densify
-from hairkit.grooming.prepare_export import select_strands
 from hairkit.parallel import one_blas_thread
 from hairkit.types.groom import Groom
 from hairkit.types.mask import HAIR, PERSON
@@ -169,7 +168,7 @@ def evaluate(
     """
     prediction = prediction.in_order_of(truth)
     groom = prediction.groom  # brows, lashes and beard are no hair of the head
-    alone = select_strands(groom, ~groom.strands.planted)
+    alone = groom.select(~groom.strands.planted)
     prediction = dataclasses.replace(prediction, groom=alone)
     groom, similarity, cameras = _align(prediction, truth)
     samples = sample_strands(groom.strands, name="predicted")

@@ -18,6 +18,7 @@ from hairkit.grooming.guide_weights import guide_mask
 from hairkit.head_model.scalp import roots_at
 from hairkit.io.strand_blocks import colours
 from hairkit.options import option
+from hairkit.simulation.posing import pose_frames
 from hairkit.types.groom import Groom
 from hairkit.types.head import Roots
 from hairkit.types.point_cache import PointCache, read_cache
@@ -80,20 +81,14 @@ def prepare_export(groom: Groom, options: ExportOptions) -> PreparedGroom:
         groom = dense_groom(simulated, options.hairs, options.seed)
     groom = complete_groom(groom)
     strands = groom.strands
-    frames = None if cache is None else _frames(simulated, strands, cache)
+    frames = None if cache is None else pose_frames(simulated, strands, cache)
     keep = _chosen(strands, options.strands) & ~_degenerate(strands)
     if not keep.any():
         raise InputError(f"the groom has no strands to write with strands={options.strands}")
     if frames is not None and cache is not None:
         frames = frames[:, keep[strands.strand_of_point]]
         cache = PointCache(frames, cache.times, cache.head_from_rest)
-    return PreparedGroom(select_strands(groom, keep), cache)
-
-
-def _frames(groom: Groom, strands: Strands, cache: PointCache) -> Float32Array:
-    from hairkit.simulation.posing import pose_frames  # which uses this module
-
-    return pose_frames(groom, strands, cache)
+    return PreparedGroom(groom.select(keep), cache)
 
 
 def dense_groom(groom: Groom, count: int, seed: int = 0) -> Groom:
@@ -139,18 +134,6 @@ def _optional_values(strands: Strands) -> tuple[object, ...]:
     return strands.widths, strands.root_uv, strands.group, strands.guide
 
 
-def select_strands(groom: Groom, keep: BoolArray) -> Groom:
-    """Return the groom with only the strands that the mask (S,) keeps."""
-    if keep.all():
-        return groom
-    return replace(
-        groom,
-        strands=groom.strands.select(keep),
-        root_triangle=groom.root_triangle[keep],
-        root_barycentric=groom.root_barycentric[keep],
-    )
-
-
 def bound_roots(groom: Groom) -> Roots:
     """Return the places on the head that the strands are bound to."""
     return roots_at(groom.head, groom.root_triangle, groom.root_barycentric)
@@ -173,7 +156,7 @@ def shorter_than(strands: Strands, length: float) -> BoolArray:
 
 
 def _guides_of(groom: Groom) -> Groom:
-    return select_strands(groom, guide_mask(groom.strands))
+    return groom.select(guide_mask(groom.strands))
 
 
 def _chosen(strands: Strands, wanted: str) -> BoolArray:

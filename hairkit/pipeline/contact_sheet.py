@@ -14,7 +14,6 @@ from hairkit.arrays import Float32Array, Int32Array, UInt8Array
 from hairkit.cameras.depth_raster import front_values, mesh_depth
 from hairkit.field.isosurface import volume_surface
 from hairkit.grooming.densify import densify
-from hairkit.grooming.prepare_export import select_strands
 from hairkit.imaging.picture_file import write_picture
 from hairkit.pipeline.figure import AMBER, GREEN, RED, Figure
 from hairkit.rendering import Lights, draw_views
@@ -120,7 +119,7 @@ def _tile_size(cameras: Sequence[Camera]) -> tuple[int, int]:
 def _with_few_guides(groom: Groom) -> Groom:
     """Return the groom with as many guides as the last row has hairs; the first cover the scalp."""
     few = np.arange(len(groom.strands)) < HAIRS
-    return groom if few.all() else select_strands(groom, few)
+    return groom if few.all() else groom.select(few)
 
 
 def _with_small_maps(groom: Groom) -> Groom:

@@ -10,7 +10,6 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array, frozen_array, read_only
 from hairkit.grooming.guide_weights import guide_mask
-from hairkit.grooming.prepare_export import select_strands
 from hairkit.parallel import parallel_for
 from hairkit.simulation.obstacle_kernels import Drawn, Points, draw_points
 from hairkit.simulation.obstacles import NO_BODIES, Bodies, groom_bodies
@@ -49,7 +48,7 @@ class GuideSimulator(ABC):
     def __init__(self, groom: Groom, contact: bool = True) -> None:
         touching = contact and len(groom.strands) > 0
         self._bodies: Bodies = groom_bodies(groom) if touching else NO_BODIES
-        self._groom = select_strands(groom, guide_mask(groom.strands))
+        self._groom = groom.select(guide_mask(groom.strands))
         self._drawn = drawn_at_rest(self._groom.strands, self._bodies)
         self._rest_gravity = np.array([0.0, -groom.physics.gravity, 0.0])
 

@@ -20,7 +20,6 @@ from hairkit.arrays import UInt8Array
 from hairkit.grooming.densify import densify
 from hairkit.grooming.guide_weights import closest_guides
 from hairkit.grooming.locks import TAPER
-from hairkit.grooming.prepare_export import select_strands
 from hairkit.imaging.picture_file import encode_picture
 from hairkit.rendering.context import shader_source
 from hairkit.rendering.head import Solid, bust_solid, head_solid
@@ -91,7 +90,7 @@ def page_guides(groom: Groom) -> Groom:
     """Return the guides of a groom that move in the page, of `POINTS` points."""
     strands = groom.strands
     step = max(1, -(-int((~strands.planted).sum()) // MOST_GUIDES))
-    some = select_strands(groom, strands.planted | (np.arange(len(strands)) % step == 0))
+    some = groom.select(strands.planted | (np.arange(len(strands)) % step == 0))
     return replace(some, strands=some.strands.resampled(POINTS))
 
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Self
 
 import numpy as np
+import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Int32Array, UInt8Array, check_reach, freeze
 from hairkit.errors import DataError, FormatError
@@ -105,6 +106,18 @@ class Groom(Previewed, Stored):
     def root_density(self) -> Float32Array:
         """(S,) density of the hair about each root, of that of full hair, 0 to 1."""
         return self.head.density_at(self.root_triangle, self.root_barycentric)
+
+    def select(self, keep: npt.ArrayLike) -> Groom:
+        """Return the groom with the strands that a mask (S,) or an index array picks."""
+        index = np.asarray(keep)
+        if index.dtype == bool and index.all():
+            return self
+        return replace(
+            self,
+            strands=self.strands.select(index),
+            root_triangle=self.root_triangle[index],
+            root_barycentric=self.root_barycentric[index],
+        )
 
     def preview(self) -> UInt8Array | None:
         """Return the guides on their head: front, left and back, (H, W, 3) uint8 RGB."""

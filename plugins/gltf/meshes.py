@@ -11,7 +11,6 @@ import numpy.typing as npt
 from hairkit.arrays import Float32Array, Float64Array, UInt8Array
 from hairkit.errors import InputError
 from hairkit.grooming.guide_weights import guide_mask
-from hairkit.grooming.prepare_export import select_strands
 from hairkit.head_model.bust import CLOTH, Bust
 from hairkit.io.glb_document import INDICES, Document, index_type
 from hairkit.io.glb_skin import ROUGHNESS_CHANNEL
@@ -118,7 +117,7 @@ class Meshes:
             if not keep.any():
                 raise InputError("the groom has no guides; choose lines=all or lines=none")
             shapes = shapes[:, keep[groom.strands.strand_of_point]]
-            groom = select_strands(groom, keep)
+            groom = groom.select(keep)
         strands, add = groom.strands, self.document.accessor
         attributes = {
             "POSITION": add(strands.points, bounds=True),

@@ -9,7 +9,7 @@ import numpy as np
 
 from hairkit.arrays import Float32Array
 from hairkit.grooming.guide_weights import follow, guide_mask
-from hairkit.grooming.prepare_export import bound_roots, dense_groom, select_strands
+from hairkit.grooming.prepare_export import bound_roots, dense_groom
 from hairkit.types.groom import Groom
 
 from .options import Options
@@ -76,7 +76,7 @@ def _denser(
     if not guide.any():
         return groom, shapes
     shapes = shapes[:, guide[groom.strands.strand_of_point]]
-    guides = select_strands(groom, guide)
+    guides = groom.select(guide)
     points = options.strip_points
     even = gather_locks(guides.strands, len(guides.strands), points, mean=False)
     rest = even.moved(guides.strands.points).reshape(-1, 3)

@@ -12,7 +12,6 @@ from blender_session import BlenderSession, only, z_up
 from client_groom import moved, nodding, off_strands, swinging, written
 
 from hairkit.grooming.guide_weights import guide_mask
-from hairkit.grooming.prepare_export import select_strands
 from hairkit.head_model.skinning import HEAD_JOINT, JOINT_NAMES
 from hairkit.manager import Manager
 from hairkit.types.groom import Groom
@@ -125,7 +124,7 @@ def test_a_long_simulation_plays(
 
     Fast waves take a shape for each frame, slow ones fewer.
     """
-    groom = select_strands(groom, guide_mask(groom.strands))
+    groom = groom.select(guide_mask(groom.strands))
     cache = swinging(groom, 120, np.linspace(*frames, 60))
     cache.save(tmp_path / "cache.npz")
     path = written(

@@ -10,7 +10,6 @@ from client_groom import moved, nodding, off_strands, swinging, written
 from three_session import seen
 
 from hairkit.grooming.guide_weights import guide_mask
-from hairkit.grooming.prepare_export import select_strands
 from hairkit.manager import Manager
 from hairkit.types.groom import Groom
 
@@ -23,7 +22,7 @@ def test_a_long_simulation_plays(
     node: str, manager: Manager, groom: Groom, tmp_path: Path, speeds: tuple[float, float]
 ) -> None:
     """Over 120 frames lines and ribbons are within 0.1 mm of the cache; the head turns along."""
-    groom = select_strands(groom, guide_mask(groom.strands))
+    groom = groom.select(guide_mask(groom.strands))
     cache = swinging(groom, 120, np.linspace(*speeds, 60))
     cache.save(tmp_path / "cache.npz")
     options = {"cache": tmp_path / "cache.npz", "strips": len(groom.strands)}

@@ -17,7 +17,6 @@ from hairkit.grooming.prepare_export import (
     dense_groom,
     point_colours,
     prepare_export,
-    select_strands,
     shorter_than,
 )
 from hairkit.head_model.scalp import evaluate
@@ -89,7 +88,7 @@ def test_dense_grooms_begin_with_the_guides() -> None:
     """Hair is added up to the number, bound to the head, equal for equal seeds."""
     groom = rich_groom()
     dense = dense_groom(groom, 200, 3)
-    guides = select_strands(groom, np.asarray(groom.strands.guide))
+    guides = groom.select(np.asarray(groom.strands.guide))
     assert len(dense.strands) == 200
     assert np.array_equal(np.flatnonzero(dense.strands.guide), np.arange(len(guides.strands)))
     bound = evaluate(dense.head, dense.root_triangle, dense.root_barycentric)
@@ -112,7 +111,7 @@ def test_colours_run_from_root_to_tip() -> None:
 def test_a_cache_comes_along_for_the_strands_that_are_written(tmp_path: Path) -> None:
     """Frames belong to the kept strands, and hair moves as rigidly as its guides do."""
     groom = rich_groom()
-    guides = select_strands(groom, np.asarray(groom.strands.guide)).strands.points
+    guides = groom.select(np.asarray(groom.strands.guide)).strands.points
     shift = np.array([0.0, 0.01, 0.02], np.float32)
     motion = np.tile(np.eye(4), (2, 1, 1))
     motion[1, :3, 3] = shift

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from hairkit.grooming.densify import densify
-from hairkit.grooming.prepare_export import dense_groom, select_strands
+from hairkit.grooming.prepare_export import dense_groom
 from hairkit.head_model.reach import Reach
 from hairkit.head_model.scalp import sample_roots
 from hairkit.head_model.template import default_head
@@ -31,7 +31,7 @@ def _part(kind: str) -> Groom:
     """Return the strands of the bristling ball that a fringe or a mohawk has."""
     groom = bristle_groom()
     x, y, z = groom.strands.roots.T
-    return select_strands(groom, np.abs(x) < 0.02 if kind == "mohawk" else (z > 0.05) & (y < 0.08))
+    return groom.select(np.abs(x) < 0.02 if kind == "mohawk" else (z > 0.05) & (y < 0.08))
 
 
 @pytest.mark.parametrize("kind", ["fringe", "mohawk"])
@@ -69,7 +69,7 @@ def test_hair_grows_under_guides_that_stand_off_the_scalp() -> None:
     groom = bristle_groom()
     x, y, z = groom.head.vertices[groom.head.faces].mean(axis=1).T
     chin = np.flatnonzero((y < -0.02) & (z > 0.04)).astype(np.int32)
-    few = select_strands(groom, np.arange(len(groom.strands)) < len(chin))
+    few = groom.select(np.arange(len(groom.strands)) < len(chin))
     middle = np.full((len(chin), 3), 1 / 3, np.float32)
     shift = np.stack([x, y, z], axis=1)[chin] - few.strands.roots
     points = few.strands.points + np.repeat(shift, few.strands.counts, axis=0)

@@ -12,7 +12,7 @@ import pytest
 from rich_groom import rich_groom, with_degenerate
 
 from hairkit.errors import MissingExtraError
-from hairkit.grooming.prepare_export import complete_groom, select_strands
+from hairkit.grooming.prepare_export import complete_groom
 from hairkit.head_model.scalp import evaluate, roots_at
 from hairkit.head_model.template import default_head
 from hairkit.io.file_format import Feature
@@ -134,7 +134,7 @@ def counterpart(info: PluginInfo, back: Groom, groom: Groom) -> Groom:
     if len(back.strands) == len(true.strands) or Feature.POINTS in info.format.exact:
         return true
     assert true.strands.guide is not None
-    return select_strands(true, true.strands.guide)
+    return true.select(true.strands.guide)
 
 
 @pytest.mark.parametrize(("info", "suffix"), BOTH_WAYS, ids=named)

@@ -24,11 +24,10 @@ def groom() -> Groom:
     """Return a few bristles."""
     ball = bristle_groom()
     pick = np.arange(0, len(ball.strands), 12)
-    from hairkit.grooming.prepare_export import select_strands
 
     keep = np.zeros(len(ball.strands), bool)
     keep[pick] = True
-    return select_strands(ball, keep)
+    return ball.select(keep)
 
 
 def made(manager: Manager, groom: Groom, **options: object) -> object:
@@ -235,9 +234,8 @@ def test_a_groom_without_strands_is_refused(
     groom: Groom, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """One line says so, from simulate and from view."""
-    from hairkit.grooming.prepare_export import select_strands
 
-    bald = select_strands(groom, np.zeros(len(groom.strands), bool))
+    bald = groom.select(np.zeros(len(groom.strands), bool))
     assert simulate(bald, tmp_path, "-o", str(tmp_path / "c.npz")) == 2
     assert "holds no strands" in capsys.readouterr().err
     (tmp_path / "s.toml").write_text("")

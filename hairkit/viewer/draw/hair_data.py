@@ -12,7 +12,6 @@ from hairkit.errors import InputError
 from hairkit.grooming.densify import densify, roots_between
 from hairkit.grooming.guide_weights import closest_guides, guide_mask
 from hairkit.grooming.locks import strand_widths
-from hairkit.grooming.prepare_export import select_strands
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
@@ -109,7 +108,7 @@ def split_guides(groom: Groom, most: int = MAX_GUIDES) -> tuple[Groom, Strands |
         guide[np.linspace(0, len(strands) - 1, most).astype(int)] = True
     if guide.all() or not guide.any():
         return groom, None
-    return select_strands(groom, guide), strands.select(~guide)
+    return groom.select(guide), strands.select(~guide)
 
 
 def choose_shares(guides: Strands) -> Float64Array:

@@ -16,7 +16,6 @@ from hairkit_plugins.alembic import curves, writer
 
 from hairkit.errors import InputError
 from hairkit.grooming.guide_weights import closest_guides
-from hairkit.grooming.prepare_export import select_strands
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.point_cache import PointCache
@@ -117,7 +116,7 @@ def test_one_strand_comes_back(tmp_path: Path) -> None:
     """Where one value may belong to the object, the strand or a point, nothing is mixed up."""
     groom = hair_groom()
     keep = np.arange(len(groom.strands)) == 5
-    path = written(select_strands(groom, keep), tmp_path)
+    path = written(groom.select(keep), tmp_path)
     back = alembic.import_groom(path, alembic.Options()).strands
     np.testing.assert_array_equal(back.points, groom.strands.select(keep).points)
     assert back.guide is None  # hair without any guide is all guides

@@ -19,7 +19,6 @@ from hypothesis import strategies as st
 from references import reference
 
 from hairkit.errors import FormatError, HairkitError, InputError
-from hairkit.grooming.prepare_export import select_strands
 from hairkit.testing import bristle_groom
 
 CONSTANT = AbcGeom.GeometryScope.kConstantScope
@@ -207,7 +206,7 @@ def test_reference_files(name: str, axis: str, counts: list[int]) -> None:
 def small_file(folder: Path) -> bytes:
     """Return an .abc of a few guides and hairs."""
     groom = bristle_groom()
-    few = select_strands(groom, np.arange(len(groom.strands)) % 24 == 0)
+    few = groom.select(np.arange(len(groom.strands)) % 24 == 0)
     path = folder / "small.abc"
     alembic.export_groom(few, path, alembic.Options(mark_guides=True))
     return path.read_bytes()
@@ -245,9 +244,7 @@ def test_truncated_files_are_refused(tmp_path: Path) -> None:
 def test_numbers_that_are_not_finite_are_refused(tmp_path: Path) -> None:
     """A NaN among the points is counted in the error."""
     good = small_file(tmp_path)
-    point = select_strands(
-        bristle_groom(), np.arange(len(bristle_groom().strands)) == 0
-    ).strands.points
+    point = bristle_groom().select(np.arange(len(bristle_groom().strands)) == 0).strands.points
     at = good.index(point[2].tobytes())
     text = refused(tmp_path, good[:at] + struct.pack("<f", float("nan")) + good[at + 4 :])
     assert "1 of the P are not finite" in text

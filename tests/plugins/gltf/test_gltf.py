@@ -15,7 +15,7 @@ from gltf_player import Client, GltfPlayer
 from hairkit_plugins import gltf
 
 from hairkit.errors import FormatError, InputError
-from hairkit.grooming.prepare_export import complete_groom, select_strands
+from hairkit.grooming.prepare_export import complete_groom
 from hairkit.io.glb_file import GlbFile
 from hairkit.io.glb_motion import read_head_motion
 from hairkit.io.head_reader import read_head
@@ -125,7 +125,7 @@ def test_khronos_validator_is_silent(tmp_path: Path) -> None:
     """No error, warning or information, whatever the options."""
     groom = rich_groom()
     cache = tmp_path / "cache.npz"
-    waving_cache(select_strands(groom, groom.strands.guide)).save(cache)
+    waving_cache(groom.select(groom.strands.guide)).save(cache)
     files = []
     for number, options in enumerate(OPTIONS):
         chosen = options | ({"cache": cache} if "cache" in options else {})
@@ -208,7 +208,7 @@ def test_every_client_plays_the_cache_at_every_frame(
     Motion of many waves takes about a shape a frame; of few, one more than these. Blender
     clamps weights to 0 to 1, three.js skins no lines.
     """
-    groom = select_strands(bristle_groom(), np.arange(len(bristle_groom().strands)) < 20)
+    groom = bristle_groom().select(np.arange(len(bristle_groom().strands)) < 20)
     cache = swinging(groom, 120, np.linspace(0.05, 3, waves))
     cache.save(tmp_path / "cache.npz")
     path = written(tmp_path, groom, strips=20, strip_points=5, cache=tmp_path / "cache.npz")

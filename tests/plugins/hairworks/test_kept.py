@@ -15,7 +15,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from references import reference
 
-from hairkit.grooming.prepare_export import select_strands
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom, HairMaterial
 
@@ -133,7 +132,7 @@ def test_fewer_guides_keep_bones_and_weights(tmp_path: Path) -> None:
     (tmp_path / "in.apx").write_text(hairworks.asset_text(asset))
     groom = hairworks.import_groom(tmp_path / "in.apx", hairworks.Options())
     keep = np.arange(len(groom.strands)) % 3 > 0
-    hairworks.export_groom(select_strands(groom, keep), tmp_path / "o.apx", hairworks.Options())
+    hairworks.export_groom(groom.select(keep), tmp_path / "o.apx", hairworks.Options())
     found = hairworks.read_apx(tmp_path / "o.apx")
     assert found.bone_names == NAMES
     _close(found.bone_weights, asset.bone_weights[keep], "weights")

@@ -14,7 +14,7 @@ from rich_groom import rich_groom as rich_groom_on_ball
 
 from hairkit.arrays import Float64Array
 from hairkit.errors import InputError, MissingExtraError
-from hairkit.grooming.prepare_export import complete_groom, dense_groom, select_strands
+from hairkit.grooming.prepare_export import complete_groom, dense_groom
 from hairkit.head_model.skinning import head_weights
 from hairkit.manager import Manager
 from hairkit.storage import to_arrays
@@ -69,7 +69,7 @@ def exported(
     if animated:
         mask = complete_groom(groom).strands.guide
         assert mask is not None
-        turning(select_strands(groom, mask)).save(folder / "cache.npz")
+        turning(groom.select(mask)).save(folder / "cache.npz")
         values["cache"] = folder / "cache.npz"
     options = manager.options("usd", values)
     manager.call("export_groom", "usd", options, groom=groom, path=path)

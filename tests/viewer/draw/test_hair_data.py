@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from hairkit.errors import InputError
-from hairkit.grooming.prepare_export import select_strands
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
@@ -106,6 +105,6 @@ def test_many_unmarked_strands_give_some_guides() -> None:
 def test_a_groom_without_strands_is_refused() -> None:
     """One line says what is missing."""
     groom = bristle_groom()
-    nothing = select_strands(groom, np.zeros(len(groom.strands), bool))
+    nothing = groom.select(np.zeros(len(groom.strands), bool))
     with pytest.raises(InputError, match="0 guides"):
         HairBody.of(nothing, 10)
