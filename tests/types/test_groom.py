@@ -59,3 +59,15 @@ def test_anything_else_is_refused(tmp_path: Path) -> None:
         Groom.load(tmp_path / "c.npz")
     with pytest.raises(InputError, match="no such file"):
         Groom.load(tmp_path / "d.npz")
+
+
+def test_strands_are_selected_with_their_roots() -> None:
+    """A mask and an array of numbers pick the same strands, in the order of the numbers."""
+    groom = bristle_groom()
+    numbers = np.array([7, 3, 5])
+    mask = np.isin(np.arange(len(groom.strands)), numbers)
+    assert groom.select(np.ones(len(groom.strands), bool)) is groom
+    some, ordered = groom.select(mask), groom.select(numbers)
+    assert np.array_equal(some.strands.roots, groom.strands.roots[[3, 5, 7]])
+    assert np.array_equal(ordered.strands.roots, groom.strands.roots[numbers])
+    assert np.array_equal(ordered.root_triangle, groom.root_triangle[numbers])
