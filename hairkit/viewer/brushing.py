@@ -76,10 +76,11 @@ class Brushing:
     def step(self, by: int) -> bool:
         """Take the last stroke back (-1) or do it again (1); return whether there was one."""
         source, target = (self.strokes, self.undone)[::-by]
-        if source:
-            target.append(source.pop())
-            Edits(tuple(self.strokes)).write(self.path)
-        return bool(source or target)
+        if not source:
+            return False
+        target.append(source.pop())
+        Edits(tuple(self.strokes)).write(self.path)
+        return True
 
     def _under(self, camera: Camera, pixel: tuple[float, float]) -> Float64Array | None:
         """Return the place (3,) of hair, or of skin to plant on, at a pixel.

@@ -88,7 +88,8 @@ def test_undo_is_exact_and_survives(session: Session, swaying_manager: object) -
     perform(other, "undo")
     perform(other, "undo")
     np.testing.assert_array_equal(other.guide_rows(), plain)
-    perform(other, "undo")
+    with pytest.raises(InputError, match="there is no stroke to undo"):
+        perform(other, "undo")
     with pytest.raises(InputError, match="no brush is taken"):
         perform(session_without_brush(other), "undo")
 
