@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
+
+from hairkit.arrays import Float32Array
+from hairkit.errors import InputError
 
 _Floats = TypeVar("_Floats", npt.NDArray[np.float32], npt.NDArray[np.float64])
 
@@ -32,3 +36,11 @@ def srgb_from_linear(linear: _Floats) -> _Floats:
     """
     curve = (1 + _OFFSET) * linear ** (1 / _GAMMA) - _OFFSET
     return np.where(linear <= _LINEAR_END, _SLOPE * linear, curve)
+
+
+def linear_from_hex(said: str, name: str) -> Float32Array:
+    """Return linear RGB (3,) of sRGB as #rrggbb; raises `InputError`, which names the setting."""
+    if not re.fullmatch("#[0-9a-fA-F]{6}", said):
+        raise InputError(f"{name} is {said!r}, expected sRGB as #rrggbb")
+    srgb = np.array(list(bytes.fromhex(said[1:]))) / 255
+    return linear_from_srgb(srgb).astype(np.float32)

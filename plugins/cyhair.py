@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hairkit.arrays import Float32Array, Int64Array
+from hairkit.arrays import Int64Array
 from hairkit.errors import InputError
 from hairkit.grooming.adopt_strands import (
     ImportOptions,
@@ -30,16 +30,16 @@ from hairkit.io.byte_reader import ByteReader, finite
 from hairkit.io.byte_writer import as_bytes
 from hairkit.io.coordinate_space import FileSpace, SpaceOptions
 from hairkit.io.file_format import Feature, FileFormat
-from hairkit.io.strand_blocks import blocks, colours
 from hairkit.options import option
 from hairkit.storage import read_bytes, write_pieces
 from hairkit.types.groom import Groom, HairMaterial
+from hairkit.types.strand_blocks import blocks, colours
 from hairkit.types.strands import Strands
 
 FORMAT = FileFormat(
     "cyHair",
     (".hair",),
-    exact={Feature.POINTS, Feature.COUNTS, Feature.WIDTHS, Feature.COLOUR},
+    exact={Feature.POINTS, Feature.COUNTS, Feature.WIDTHS, Feature.COLOUR, Feature.COLOURS},
 )
 
 SIGNATURES = (b"HAIR", b"hair")
@@ -100,8 +100,8 @@ def import_groom(path: Path, options: Options) -> Groom:
     if colours is not None:
         colours = finite(colours, path, "colours")
     curves = CurveSet(space.points_to_head(points), counts, widths, colour=colours)
-    strands, kept = strands_of(curves, path)
-    return adopt(strands, options, path, _material(header, strands, kept.colour, space))
+    strands, _ = strands_of(curves, path)
+    return adopt(strands, options, path, _material(header, strands, space))
 
 
 def _pieces(groom: Groom, options: Options) -> Iterator[memoryview]:
@@ -121,7 +121,7 @@ def _pieces(groom: Groom, options: Options) -> Iterator[memoryview]:
         widths = np.asarray(strands.widths)[block.points]
         yield as_bytes("<f4", widths / np.float32(space.metres))
     if options.colours:
-        shades = colours(look, strands.counts)
+        shades = colours(look, strands)
         for block in blocks(strands):
             yield as_bytes("<f4", shades.at(block.strands))
 
@@ -148,17 +148,14 @@ def _counts(reader: ByteReader, header: Any) -> Int64Array:
     return counts
 
 
-def _material(
-    header: Any, strands: Strands, colours: Float32Array | None, space: FileSpace
-) -> HairMaterial:
+def _material(header: Any, strands: Strands, space: FileSpace) -> HairMaterial:
     """Return the look; the header's thickness of 1 and white colour mean that they were not set."""
     width = float(header["thickness"]) * space.metres
     if not 0 < width <= _WIDEST:
         known = strands.widths[strands.widths > 0] if strands.widths is not None else ()
         width = float(np.mean(known, dtype=np.float64)) if len(known) else HairMaterial.width
-    look = mean_look(strands, colours)
-    if look is not None:
-        return replace(look, width=width)
+    if strands.colours is not None:
+        return replace(mean_look(strands), width=width)
     colour = np.asarray(header["colour"], np.float32)
     if np.isfinite(colour).all() and (colour >= 0).all() and (colour < 1).any():
         return HairMaterial(colour, colour, width)

@@ -23,9 +23,9 @@ from hairkit.io.coordinate_space import FileSpace, SpaceOptions
 from hairkit.io.file_format import Feature, FileFormat
 from hairkit.io.number_text import format_rows, read_numbers
 from hairkit.io.polylines import chains
-from hairkit.io.strand_blocks import blocks
 from hairkit.storage import read_bytes, write_pieces
 from hairkit.types.groom import Groom
+from hairkit.types.strand_blocks import blocks
 from hairkit.types.strands import Strands
 
 FORMAT = FileFormat("OBJ lines", (".obj",), exact={Feature.POINTS, Feature.COUNTS})

@@ -22,7 +22,6 @@ from hairkit.errors import InputError
 from hairkit.grooming.adopt_strands import (
     ImportOptions,
     adopt,
-    mean_look,
     plain_widths,
 )
 from hairkit.grooming.curve_sets import CurveSet, strands_of
@@ -33,9 +32,9 @@ from hairkit.io.byte_writer import as_bytes
 from hairkit.io.coordinate_space import FileSpace, SpaceOptions
 from hairkit.io.file_format import Feature, FileFormat
 from hairkit.io.ply_elements import columns, read_elements, strand_order, vertex_points
-from hairkit.io.strand_blocks import blocks, colours
 from hairkit.storage import read_bytes, write_pieces
 from hairkit.types.groom import Groom
+from hairkit.types.strand_blocks import blocks, colours
 
 FORMAT = FileFormat(
     "PLY",
@@ -48,7 +47,7 @@ FORMAT = FileFormat(
         Feature.GROUP,
         Feature.GUIDE,
     },
-    partial={Feature.COLOUR: "8-bit sRGB"},
+    partial={Feature.COLOUR: "8-bit sRGB", Feature.COLOURS: "8-bit sRGB"},
 )
 
 _MOST_SEGMENTS = 2**16 - 1
@@ -97,15 +96,15 @@ def import_groom(path: Path, options: Options) -> Groom:
         colour=shades,
         **_strand_values(elements.get("strand", {}), path),
     )
-    strands, kept = strands_of(curves, path)
-    return adopt(strands, options, path, mean_look(strands, kept.colour))
+    strands, _ = strands_of(curves, path)
+    return adopt(strands, options, path)
 
 
 def _pieces(groom: Groom, space: FileSpace) -> Iterator[bytes | memoryview]:
     """Yield the file's bytes: the header, then vertices, strands and edges."""
     strands = groom.strands
     yield _header(len(strands.points), len(strands)).encode("ascii")
-    shades = colours(groom.material, strands.counts).mapped(_to_bytes)
+    shades = colours(groom.material, strands).mapped(_to_bytes)
     for block in blocks(strands):
         points = space.points_to_file(strands.points[block.points])
         shade = shades.at(block.strands)

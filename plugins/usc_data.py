@@ -22,9 +22,9 @@ from hairkit.io.byte_reader import ByteReader, finite
 from hairkit.io.byte_writer import as_bytes
 from hairkit.io.coordinate_space import FileSpace, SpaceOptions
 from hairkit.io.file_format import Feature, FileFormat
-from hairkit.io.strand_blocks import blocks
 from hairkit.storage import read_bytes, write_pieces
 from hairkit.types.groom import Groom
+from hairkit.types.strand_blocks import blocks
 from hairkit.types.strands import Strands
 
 FORMAT = FileFormat(

@@ -11,6 +11,7 @@ void main() {
     float cover;
     StrandPoint point = strand_points[index];
     RibbonPoint r = shaped(index, point, tangent, cover);
-    r.colour = packUnorm4x8(vec4(seen_colour(point.position.xyz, tangent, point.position.w, point.look.y), cover));
+    vec3 own = unpacked(floatBitsToUint(point.look.z));
+    r.colour = packUnorm4x8(vec4(seen_colour(point.position.xyz, tangent, own, point.look.y), cover));
     ribbon_points[index] = r;
 }

@@ -5,7 +5,7 @@ layout(local_size_x = 64) in;
 
 struct StrandPoint {
     vec4 position;  // xyz head frame in metres; w arc length over strand length, 0 root, 1 tip
-    vec4 look;      // diameter in metres; the strand's random number in [0, 1); two unused
+    vec4 look;      // diameter in metres; the strand's random number in [0, 1); its packed colour; unused
 };
 
 layout(std430, binding = 0) readonly buffer StrandPoints { StrandPoint strand_points[]; };

@@ -13,6 +13,7 @@ layout(local_size_x = 64) in;
 layout(std430, binding = 1) readonly buffer Hairs { uint hairs[]; };
 layout(std430, binding = 2) readonly buffer Offsets { uint offsets[]; };
 layout(std430, binding = 3) readonly buffer Places { float places[]; };
+layout(std430, binding = 5) readonly buffer Colours { uint colours[]; };    // of the guides
 layout(std430, binding = 7) buffer Sums { uint sums[]; };   // two per pixel, two 16-bit numbers each
 
 uniform sampler2D u_solid_depth;
@@ -87,6 +88,15 @@ void stroke(vec3 a, vec3 b, vec4 from, vec4 to, float width, float dither) {
     }
 }
 
+vec3 own_colour(int strand, int k) {
+    uint first = hairs[3 * strand];
+    uint a = first & 0xFFFFu, b = first >> 16, c = hairs[3 * strand + 1] & 0xFFFFu;
+    vec2 weight = unpackUnorm2x16(hairs[3 * strand + 2]);
+    return weight.x * unpacked(colours[int(a) * u_points + k])
+         + weight.y * unpacked(colours[int(b) * u_points + k])
+         + (1.0 - weight.x - weight.y) * unpacked(colours[int(c) * u_points + k]);
+}
+
 void main() {
     int strand = int(gl_GlobalInvocationID.x);
     if (strand >= u_count) return;
@@ -101,7 +111,7 @@ void main() {
         vec4 look = vec4(0.0, 0.0, 0.0, arriving(s));
         if (look.a > HIDDEN) {
             vec3 tangent = normalize(after - before + vec3(0.0, 1e-12, 0.0));
-            look.rgb = seen_colour(here, tangent, float(k) / float(u_points - 1), random);
+            look.rgb = seen_colour(here, tangent, own_colour(strand, k), random);
             if (k > 0 && last_look.a > HIDDEN) {
                 float width = 0.001 * unpackHalf2x16(offsets[2 * (start + k) + 1]).y * u_wider * s.scale;
                 stroke(last.pixel, s.pixel, last_look, look, width, fract(random + float(k) * 0.7548777));

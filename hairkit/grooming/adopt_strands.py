@@ -23,10 +23,10 @@ from hairkit.head_model.scalp import bind, roots_at
 from hairkit.head_model.template import default_head
 from hairkit.io.coordinate_space import SpaceOptions
 from hairkit.io.head_reader import read_head
-from hairkit.io.strand_blocks import bounds
 from hairkit.options import option
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.head import Head
+from hairkit.types.strand_blocks import bounds, colours
 from hairkit.types.strands import Strands
 
 __all__ = [
@@ -47,6 +47,8 @@ REACH = 1e6
 """Metres; beyond them, squares of lengths leave what a float32 can hold."""
 FARTHEST = 0.03
 """Roots of a head's hair lie within this many metres of it, in the mean."""
+SAME_COLOUR = 0.01
+"""Difference of the square roots of colours that nobody sees; 8 bits have less."""
 _OUTER = (1.0, 99.0)
 _TYPICAL_SPREAD = 0.2
 _TIP_FIRST = 0.5
@@ -120,13 +122,13 @@ def adopt(
     Parameters
     ----------
     strands
-        Metres; with the widths and root uv that the file had, else None.
+        Metres; with the widths, root uv and colours that the file had, else None.
     options
         Names the head, if any, and says whether to turn the strands over.
     source
         The file, for messages.
     material
-        Look; where None, the default one with the mean of the strands' widths.
+        Look; where None, the mean of the strands' widths and colours, as far as there are any.
     head
         The head that came with the file, which the option overrules.
 
@@ -148,11 +150,11 @@ def adopt(
                 material, root_colour=material.tip_colour, tip_colour=material.root_colour
             )
     _check_spread(strands, options, source)
+    material = mean_look(strands) if material is None else material
+    strands = _without_ramp(strands, material)
     head = _head(strands, options, head, source)
     if not options.reverse:
         _warn_of_tips(strands, head, source)
-    if material is None:
-        material = _with_mean_width(strands)
     if strands.widths is None:
         _log.warning("%s: no widths; strands are %g mm wide", source, 1000 * material.width)
     triangle, barycentric = bind(strands.roots, head)
@@ -165,36 +167,33 @@ def adopt(
 
 
 def reverse_strands(strands: Strands) -> Strands:
-    """Return the strands with their points, and widths, from tip to root."""
+    """Return the strands with their points, widths and colours from tip to root."""
     owner = strands.strand_of_point
     rows = (strands.offsets[:-1] + strands.offsets[1:] - 1)[owner] - np.arange(len(owner))
     widths = None if strands.widths is None else strands.widths[rows]
-    return replace(strands, points=strands.points[rows], widths=widths)
+    colours = None if strands.colours is None else strands.colours[rows]
+    return replace(strands, points=strands.points[rows], widths=widths, colours=colours)
 
 
-def _with_mean_width(strands: Strands) -> HairMaterial:
-    """Return the default look, as wide as the strands are in the mean."""
-    widths = strands.widths
-    if widths is None or not (widths > 0).any():
-        return HairMaterial()
-    return HairMaterial(width=float(widths[widths > 0].mean(dtype=np.float64)))
+def mean_look(strands: Strands) -> HairMaterial:
+    """Return the look in the mean of widths, and of colours at roots and tips; else the default."""
+    widths, colours = strands.widths, strands.colours
+    known: dict[str, Any] = {}
+    if widths is not None and (widths > 0).any():
+        known["width"] = float(widths[widths > 0].mean(dtype=np.float64))
+    if colours is not None:
+        known["root_colour"] = colours[strands.offsets[:-1]].mean(axis=0, dtype=np.float64)
+        known["tip_colour"] = colours[strands.offsets[1:] - 1].mean(axis=0, dtype=np.float64)
+    return HairMaterial(**known)
 
 
-def mean_look(
-    strands: Strands, colours: npt.NDArray[np.floating[Any]] | None
-) -> HairMaterial | None:
-    """Return the look in the mean: of widths, and of linear RGB (P, 3) at roots and tips.
-
-    None where there are no colours.
-    """
-    if colours is None:
-        return None
-    root, tip = colours[strands.offsets[:-1]], colours[strands.offsets[1:] - 1]
-    return replace(
-        _with_mean_width(strands),
-        root_colour=root.mean(axis=0, dtype=np.float64),
-        tip_colour=tip.mean(axis=0, dtype=np.float64),
-    )
+def _without_ramp(strands: Strands, look: HairMaterial) -> Strands:
+    """Return the strands without colours where these are what the look says anyway."""
+    if strands.colours is None:
+        return strands
+    plain = replace(strands, colours=None)
+    off = np.sqrt(strands.colours.clip(0, 1)) - np.sqrt(colours(look, plain).at().clip(0, 1))
+    return plain if np.abs(off).max(initial=0) < SAME_COLOUR else strands
 
 
 def _with_length(strands: Strands, source: object) -> Strands:

@@ -16,6 +16,7 @@ import numpy.typing as npt
 from scipy.spatial import cKDTree
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
+from hairkit.colour import linear_from_hex
 from hairkit.field.growth_prior import gradient
 from hairkit.grooming.head_collision import push_out_of_head
 from hairkit.head_model.bvh import TriangleTree, build_tree, nearest_on_surface
@@ -24,6 +25,7 @@ from hairkit.head_model.signed_distance import signed_distance
 from hairkit.types.edits import Edit
 from hairkit.types.groom import Groom
 from hairkit.types.head import Head, Roots
+from hairkit.types.strand_blocks import colours
 from hairkit.types.strands import PLANTED, Strands
 from hairkit.types.volume import VoxelGrid
 
@@ -36,7 +38,7 @@ CELL, MARGIN = 0.004, 0.02
 UNMOVED = 1e-7
 """Metres by which a strand must move to count as changed."""
 MIRROR = np.array([-1.0, 1.0, 1.0])
-_EACH = ("points", "triangle", "barycentric", "source", "group")
+_EACH = ("points", "triangle", "barycentric", "source", "group", "colours")
 
 
 class HeadRoom(NamedTuple):
@@ -90,6 +92,8 @@ class Stroke(NamedTuple):
     amount: float
     pitch: float
     group: str
+    colour: Float32Array
+    """(3,) linear RGB."""
 
     def reach(self, points: npt.NDArray[np.floating]) -> tuple[Float64Array, Int64Array]:
         """Return how much (...) the stroke acts at points (..., 3), 0 to 1, and its place there."""
@@ -113,9 +117,13 @@ class Hair:
     """(S,) strand of the groom that gives each its looks."""
     group: Int32Array
     """(S,) group number."""
+    colours: Float32Array
+    """(S, M, 3) linear RGB."""
     room: HeadRoom
     density: Float32Array | None
     """(V,) of the head; None: full hair."""
+    dyed: bool = False
+    """Whether a brush gave colours, so that they are no longer those of the groom."""
     around: Hair | None = None
     """The hair that these strands were taken from."""
 
@@ -135,7 +143,8 @@ class Hair:
         points = even.points.reshape(-1, most, 3).astype(np.float64)
         bound = groom.root_triangle, groom.root_barycentric
         source, room = np.arange(len(even)), HeadRoom.around(head)
-        return cls(points, *bound, source, group, room, head.density)
+        own = colours(groom.material, even).at().reshape(points.shape)
+        return cls(points, *bound, source, group, own, room, head.density)
 
     def onto(self, groom: Groom) -> Groom:
         """Return the groom with these strands in the place of its own."""
@@ -148,9 +157,10 @@ class Hair:
             uv = np.where(own[:, None], uv, roots_at(head, self.triangle, self.barycentric).uv)
         group = self.group if look.group is not None or self.group.any() else None
         points = self.points.reshape(-1, 3).astype(np.float32)
+        own = self.colours.reshape(-1, 3) if self.dyed or strands.colours is not None else None
         return replace(
             groom,
-            strands=replace(look, points=points, root_uv=uv, group=group),
+            strands=replace(look, points=points, root_uv=uv, group=group, colours=own),
             head=head if self.density is head.density else replace(head, density=self.density),
             root_triangle=self.triangle,
             root_barycentric=self.barycentric,
@@ -178,7 +188,7 @@ class Hair:
 
     def copy(self) -> Hair:
         """Return hair that brushes can change while this stays."""
-        return replace(self, points=self.points.copy())
+        return replace(self, points=self.points.copy(), colours=self.colours.copy())
 
     def take(self, index: npt.NDArray[Any]) -> Hair:
         """Return some strands, by numbers or a mask, around which are all of these."""
@@ -189,6 +199,7 @@ class Hair:
         """Take back the strands that `take` gave, without those removed, and what is planted."""
         old = len(index)
         self.points[index], self.density = some.points[:old], some.density
+        self.colours[index], self.dyed = some.colours[:old], some.dyed
         if some.kept.all() and len(some.points) == old:
             return
         kept = np.ones(len(self.points), bool)
@@ -222,6 +233,8 @@ class Hair:
         start, end = arcs[row, after - 1], arcs[row, after]
         t = ((wanted - start) / np.maximum(end - start, 1e-12))[..., None]
         self.points[some] = points[row, after - 1] * (1 - t) + points[row, after] * t
+        t, own = t.clip(0, 1).astype(np.float32), self.colours[some]
+        self.colours[some] = own[row, after - 1] * (1 - t) + own[row, after] * t
         del self.lengths
         self.moved |= some
 
@@ -231,7 +244,7 @@ class Hair:
             near = cKDTree(self.around.points[:, 0]).query(roots.positions)[1]
             new = points, roots.triangle, roots.barycentric, self.around.source[near]
             groups = np.full(len(points), group, np.int32)
-            for name, values in zip(_EACH, (*new, groups), strict=True):
+            for name, values in zip(_EACH, (*new, groups, self.around.colours[near]), strict=True):
                 setattr(self, name, np.concatenate([getattr(self, name), values]))
             self.__dict__.pop("lengths", None)
             self.moved, self.kept = (
@@ -273,4 +286,5 @@ def strokes_of(edit: Edit, usual: float) -> list[Stroke]:
         path = np.stack([np.interp(np.linspace(0, way[-1], count), way, x) for x in path.T], 1)
     amount = usual if setting.amount is None else setting.amount
     sides = [path, path * MIRROR] if setting.mirror and len(path) else [path]
-    return [Stroke(side, setting.radius, amount, setting.pitch, setting.group) for side in sides]
+    rest = setting.pitch, setting.group, linear_from_hex(setting.colour, "colour")
+    return [Stroke(side, setting.radius, amount, *rest) for side in sides]

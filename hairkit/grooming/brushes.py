@@ -113,6 +113,14 @@ def lengthen(hair: Hair, strokes: list[Stroke]) -> None:
     hair.scale(1 + longer / np.maximum(hair.arcs[:, -1], 1e-12))
 
 
+def dye(hair: Hair, strokes: list[Stroke]) -> None:
+    """Give hair the colour of the stroke, in the mixture of light; `amount` is its share."""
+    for stroke in strokes:
+        share = np.clip(stroke.amount * stroke.reach(hair.points)[0], 0, 1)[..., None]
+        hair.colours = (hair.colours + share * (stroke.colour - hair.colours)).astype(np.float32)
+    hair.dyed = True
+
+
 class Kind(NamedTuple):
     """A brush: a function that does a stroke and, where it is mirrored, the other one, both to the
     hair as it was before; its usual amount; and whether its path is drawn on the skin below it,
@@ -127,7 +135,7 @@ BRUSHES = {
     "comb": Kind(comb, 1.0), "part": Kind(part, 0.03, True), "puff": Kind(puff, 0.01),
     "smooth": Kind(smooth, 0.5), "curl": Kind(curl, 0.006), "cut": Kind(cut, 0.0),
     "trim": Kind(trim, 0.03), "lengthen": Kind(lengthen, 0.02),
-    "add": Kind(add, 1.0, True), "thin": Kind(thin, 0.5, True),
+    "add": Kind(add, 1.0, True), "thin": Kind(thin, 0.5, True), "dye": Kind(dye, 1.0),
 }  # fmt: skip
 """Brushes by name."""
 

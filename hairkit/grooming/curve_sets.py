@@ -122,5 +122,6 @@ def strands_of(joined: CurveSet, source: object) -> tuple[Strands, CurveSet]:
         root_uv=left.root_uv,
         group=None if left.group is None else left.group.astype(np.int32),
         guide=None if left.guide is None else left.guide != 0,
+        colours=left.colour,
     )
     return strands, left

@@ -96,6 +96,7 @@ def densify(
     bundle = _Bundle.of(even)
     positions, uv = _new_roots(guides, bundle, count - len(strands), roots, seed, generator)
     mix = _choose_guides(bundle, positions)
+    colours = None if even.colours is None else mix.of(even.colours.reshape(bundle.course.shape))
     course, nearest = _mix_courses(bundle, mix), mix.guides[:, 0]
     thinned = np.ones(len(positions), np.float32)
     if locks is None:
@@ -108,7 +109,7 @@ def densify(
         course *= (1 - rim * generator.random(len(rim)) ** 2)[:, None, None].astype(np.float32)
         new = _lay_in_locks(bundle, positions[:, None] + course, locks, stray, generator)
         thinned = np.where(stray, STRAY_WIDTH, 1 - rim)
-    return _join(even, new, nearest, thinned, uv, material)
+    return _join(even, new, nearest, thinned, uv, colours, material)
 
 
 def roots_between(guides: Groom, count: int, seed: int = 0) -> Roots:
@@ -145,6 +146,13 @@ class _Bundle:
 class _Mix:
     guides: Int64Array  # (N, MIXED), nearest first
     weights: Float32Array  # (N, MIXED), sum 1
+
+    def of(self, values: Float32Array) -> Float32Array:
+        """Return (N, m, 3) mixed of the guides' values (S, m, 3)."""
+        mixed = np.zeros((len(self.guides), *values.shape[1:]), np.float32)
+        for k in range(self.guides.shape[1]):
+            mixed += self.weights[:, k, None, None] * values[self.guides[:, k]]
+        return mixed
 
 
 def _smoothing(m: int) -> Float32Array:
@@ -243,9 +251,7 @@ def _agreement(bundle: _Bundle, near: Int64Array) -> npt.NDArray[np.bool_]:
 
 def _mix_courses(bundle: _Bundle, mix: _Mix) -> Float32Array:
     """Return (N, m, 3) courses relative to the root, as long as the guides they are mixed from."""
-    course = np.zeros((len(mix.guides), bundle.points, 3), np.float32)
-    for k in range(mix.guides.shape[1]):
-        course += mix.weights[:, k, None, None] * bundle.course[mix.guides[:, k]]
+    course = mix.of(bundle.course)
     lengths = _shape_lengths(bundle.course)
     wanted = (mix.weights * lengths[mix.guides]).sum(axis=1)
     stretch = np.clip(wanted / np.maximum(_shape_lengths(course), 1e-9), 1.0, MOST_STRETCH)
@@ -311,6 +317,7 @@ def _join(
     nearest: Int64Array,
     thinned: Float32Array,
     uv: Float32Array | None,
+    colours: Float32Array | None,
     material: HairMaterial,
 ) -> Strands:
     old, (count, m, _) = len(even), new.shape
@@ -326,4 +333,5 @@ def _join(
         np.concatenate([even.root_uv, uv]) if keep_uv else None,
         group,
         np.arange(total) < old,
+        None if colours is None else np.concatenate([even.colours, colours.reshape(-1, 3)]),
     )

@@ -16,12 +16,12 @@ from hairkit.errors import InputError
 from hairkit.grooming.densify import densify, roots_between
 from hairkit.grooming.guide_weights import guide_mask
 from hairkit.head_model.scalp import roots_at
-from hairkit.io.strand_blocks import colours
 from hairkit.options import option
 from hairkit.simulation.posing import pose_frames
 from hairkit.types.groom import Groom
 from hairkit.types.head import Roots
 from hairkit.types.point_cache import PointCache, read_cache
+from hairkit.types.strand_blocks import colours
 from hairkit.types.strands import Strands
 
 SHORTEST = 1e-5
@@ -140,8 +140,8 @@ def bound_roots(groom: Groom) -> Roots:
 
 
 def point_colours(groom: Groom) -> Float32Array:
-    """Return (P, 3) linear RGB, from the root's colour to the tip's along each strand."""
-    return colours(groom.material, groom.strands.counts).at()
+    """Return (P, 3) linear RGB of all points."""
+    return colours(groom.material, groom.strands).at()
 
 
 def shorter_than(strands: Strands, length: float) -> BoolArray:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array
@@ -53,14 +55,7 @@ def add_waves(strands: Strands, waves: Waves, seed: int = 0, spread: float = 1.0
     angle = phase[:, None] + turn * 2 * np.pi * arc / pitch
     offset = np.cos(angle)[..., None] * first + np.sin(angle)[..., None] * second
     wound = points + radius[..., None] * offset
-    return Strands(
-        wound.reshape(-1, 3).astype(np.float32),
-        strands.offsets,
-        strands.widths,
-        strands.root_uv,
-        strands.group,
-        strands.guide,
-    )
+    return replace(strands, points=wound.reshape(-1, 3).astype(np.float32))
 
 
 def grown_share(arc: Float32Array | Float64Array, waves: Waves) -> Float64Array:

@@ -29,7 +29,6 @@ every size before they ask for memory. Grooms and caches save and load themselve
 * `polylines`: strands from loose edges
 * `spline_curves`: points on spline curves from control points
 * `streamed`: arrays made while they are written
-* `strand_blocks`: large grooms written in blocks of little memory
 * `strokes`: strokes on photos, labelme's JSON
 * `textures`: texture maps of mesh files
 * `video`: a video of a turn as a capture

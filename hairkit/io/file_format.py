@@ -26,6 +26,7 @@ class Feature(StrEnum):
     SKIN = "skeleton and skin"
     CAPSULES = "capsules"
     COLOUR = "colour"
+    COLOURS = "colour per point"
     CURL = "curl"
     PHYSICS = "physics"
     ANIMATION = "animation"

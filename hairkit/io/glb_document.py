@@ -15,10 +15,10 @@ import numpy.typing as npt
 
 from hairkit.io.byte_writer import as_bytes
 from hairkit.io.glb_file import BINARY_CHUNK, JSON_CHUNK
-from hairkit.io.strand_blocks import bounds as bounds_of
 from hairkit.io.streamed import Streamed
 from hairkit.storage import write_pieces
 from hairkit.types.skin import PNG
+from hairkit.types.strand_blocks import bounds as bounds_of
 from hairkit.version import __version__
 
 _COMPONENTS = {"i1": 5120, "u1": 5121, "i2": 5122, "u2": 5123, "u4": 5125, "f4": 5126}

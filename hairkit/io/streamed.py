@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.io.strand_blocks import Block, blocks
+from hairkit.types.strand_blocks import Block, blocks
 from hairkit.types.strands import Strands
 
 
@@ -32,16 +32,16 @@ class Streamed:
 
 
 def at_points(
-    strands: Strands, kind: npt.DTypeLike, values: Callable[[Block], npt.ArrayLike]
+    strands: Strands, kind: npt.DTypeLike, values: Callable[[Block], npt.ArrayLike], *size: int
 ) -> Streamed:
-    """Return an array (P,) whose values at the points of a block a function makes."""
+    """Return an array (P, *size) whose values at the points of a block a function makes."""
     dtype = np.dtype(kind)
 
     def pieces() -> Iterator[npt.NDArray[Any]]:
         for block in blocks(strands):
             yield np.asarray(values(block), dtype)
 
-    return Streamed(dtype, (len(strands.points),), pieces)
+    return Streamed(dtype, (len(strands.points), *size), pieces)
 
 
 def repeat_row(row: npt.NDArray[Any], count: int) -> Streamed:

@@ -12,12 +12,16 @@ import moderngl
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.arrays import Float32Array, Int64Array
+from hairkit.arrays import Float32Array, Int64Array, UInt32Array
 from hairkit.rendering.context import Renderer
 from hairkit.rendering.gl_camera import DepthRange, set_camera, set_uniforms
 from hairkit.types.camera import Camera
+from hairkit.types.groom import HairMaterial
+from hairkit.types.strand_blocks import blocks, colours
 from hairkit.types.strands import Strands
 
+TEN_BITS = 1023
+"""Largest number of a channel of a packed colour."""
 _RESTART = 0xFFFFFFFF
 _GROUP = 64  # local_size_x of ribbon_shape.glsl
 _MOST_POINTS = 65535 * _GROUP  # groups of a dispatch, which every OpenGL allows
@@ -38,11 +42,18 @@ class RibbonBuffers:
 
 @contextlib.contextmanager
 def ribbons(
-    gl: Renderer, strands: Strands, width: float | npt.ArrayLike
+    gl: Renderer,
+    strands: Strands,
+    width: float | npt.ArrayLike,
+    material: HairMaterial | None = None,
 ) -> Iterator[tuple[RibbonBuffers, ...]]:
     """Upload strands for a block, `width` metres wide (a number or (P,)), in as many parts as
-    OpenGL takes."""
+    OpenGL takes. Without colours of their own they have those of the material, if it is given."""
     records = _point_records(strands, width)
+    if material is not None:
+        for block in blocks(strands):
+            own = colours(material, strands).at(block.strands)
+            records[block.points, 6] = packed_colours(own).view(np.float32)
     with contextlib.ExitStack() as kept:
         yield tuple(
             _upload(gl, records[strands.offsets[first] : strands.offsets[end]], counts, kept)
@@ -104,6 +115,12 @@ def strand_numbers(count: int) -> Float32Array:
     """Return a quasi-random number in [0, 1) for each strand (golden-ratio sequence)."""
     numbers: Float32Array = np.mod(np.arange(count) * _GOLDEN_STEP, 1.0).astype(np.float32)
     return numbers
+
+
+def packed_colours(colours: Float32Array) -> UInt32Array:
+    """Return linear colours (..., 3) as `unpacked` of hair_colour.glsl reads them, (...)."""
+    root = np.rint(TEN_BITS * np.sqrt(np.clip(colours, 0, 1))).astype(np.uint32)
+    return np.asarray(1 << 30 | root[..., 2] << 20 | root[..., 1] << 10 | root[..., 0], np.uint32)
 
 
 def _point_records(strands: Strands, width: float | npt.ArrayLike) -> Float32Array:

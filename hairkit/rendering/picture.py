@@ -67,7 +67,8 @@ def draw(
     width, height
         Size of the picture; the camera is scaled to it. By default the camera's own.
     material
-        Colour and width of the hair; None: the groom's, or the default.
+        Width of the hair, and its colour where strands have none of their own; None: the groom's,
+        or the default.
     lights
         None: lights fixed to the camera.
     background
@@ -119,14 +120,10 @@ def draw_views(
     own = [head_solid(head, material)] if head is not None else []
     shown = (*own, *([below] if below is not None else []), *solids)
     density = hair_density(strands, shown)
-    look = {
-        "u_root_colour": tuple(material.root_colour.tolist()),
-        "u_tip_colour": tuple(material.tip_colour.tolist()),
-    }
     pictures = []
     with (
         renderer() as gl,
-        ribbons(gl, strands, display_width(strands, material)) as buffers,
+        ribbons(gl, strands, display_width(strands, material), material) as buffers,
         contextlib.ExitStack() as uploads,
         contextlib.ExitStack() as kept,
     ):
@@ -140,7 +137,7 @@ def draw_views(
                 kept.close()
                 volume = light_volume(density, shot.lights)
                 kept.enter_context(_light_texture(gl, volume))
-            samples = _shoot(gl, shot, strands, buffers, look, shown, maps, volume, skin)
+            samples = _shoot(gl, shot, strands, buffers, shown, maps, volume, skin)
             background = backgrounds[index] if backgrounds is not None else backdrop(camera)
             pictures.append(_over(average_samples(samples, camera), background))
     return pictures
@@ -197,7 +194,6 @@ def _shoot(
     shot: _Shot,
     strands: Strands,
     buffers: Sequence[RibbonBuffers],
-    look: dict[str, Any],
     solids: Sequence[Solid],
     maps: Sequence[Mapping[str, moderngl.Texture]],
     light: LightVolume,
@@ -223,7 +219,6 @@ def _shoot(
             depth,
             shader="hair_ribbon_shade",
             **uniforms,
-            **look,
         )
         return np.asarray(picture.read(), np.uint8)
 

@@ -1,6 +1,6 @@
 """A groom for the page: head, bust, hair and the guides that move it, as one block of bytes.
 
-Four bytes `HKS2`, the length of a JSON header (uint32, little-endian), the header padded to a
+Four bytes `HKS3`, the length of a JSON header (uint32, little-endian), the header padded to a
 multiple of four, then the arrays that it names with type, shape and place.
 """
 
@@ -20,8 +20,10 @@ from hairkit.arrays import UInt8Array
 from hairkit.grooming.densify import densify
 from hairkit.grooming.guide_weights import closest_guides
 from hairkit.grooming.locks import TAPER
+from hairkit.grooming.prepare_export import point_colours
 from hairkit.imaging.picture_file import encode_picture
 from hairkit.rendering.context import shader_source
+from hairkit.rendering.hair import packed_colours
 from hairkit.rendering.head import Solid, bust_solid, head_solid
 from hairkit.rendering.light import EXPOSURE, Lights, hair_density, light_volume
 from hairkit.rendering.picture import display_width
@@ -51,7 +53,8 @@ def write_packet(groom: Groom, path: Path, roots: Roots | None = None) -> None:
 
 def packet_of(groom: Groom, roots: Roots | None = None) -> bytes:
     """Return the packet of a groom; `roots` are those of the hair between its guides, if known."""
-    strands, guides = groom.strands, page_guides(groom).strands
+    strands, moved = groom.strands, page_guides(groom)
+    guides = moved.strands
     hair = densify(groom, HAIRS, roots=roots).resampled(POINTS)
     shape = (-1, POINTS, 3)
     joined = Strands.from_list([*guides.points.reshape(shape), *hair.points.reshape(shape)])
@@ -67,6 +70,7 @@ def packet_of(groom: Groom, roots: Roots | None = None) -> bytes:
         "head_eyes": _on_eyes(head),
         **({} if bust is None else _mesh("bust", bust)),
         "guides": guides.points.astype(np.float32).reshape(shape),
+        "tint": packed_colours(point_colours(moved)).reshape(-1, POINTS),
         "stiff": guides.planted.astype(np.uint8),
         "hair": hair.points.astype(np.float32).reshape(shape),
         "carriers": followed.guides[len(guides) :].astype(np.float32),
@@ -121,10 +125,8 @@ def _mesh(name: str, solid: Solid) -> dict[str, npt.NDArray[Any]]:
 
 
 def _look(hair: Strands, material: HairMaterial) -> dict[str, Any]:
-    """Return colours, width in metres and taper of the hair as uniforms of its shader."""
+    """Return width in metres and taper of the hair as uniforms of its shader."""
     return {
-        "u_root_colour": material.root_colour.tolist(),
-        "u_tip_colour": material.tip_colour.tolist(),
         "u_width": float(display_width(replace(hair, widths=None), material)),
         "u_taper": TAPER,
     }

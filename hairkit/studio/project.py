@@ -41,7 +41,7 @@ from hairkit.types.chosen import Chosen, ChosenHair
 from hairkit.types.edits import Edits, read_edits
 
 STATE = "studio.json"
-PACKET = "HKS2"
+PACKET = "HKS3"
 """Kind of file in which pages get their hair; another one is made anew."""
 RESULT = "result"
 _BUILT = "studio.json"

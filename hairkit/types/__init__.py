@@ -25,6 +25,7 @@ the packages named after the subject.
 * `scene`: cameras and fitted head
 * `skin`: texture maps and blendshapes of a head
 * `skin_look`: how skin reflects and scatters light
+* `strand_blocks`: strands in blocks of little memory, and values along them
 * `strands`: packed polylines
 * `texture_example`: what a texture is to become
 * `tie`: ties, and the tails that hang from them

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array
-from hairkit.colour import linear_from_srgb, srgb_from_linear
+from hairkit.colour import linear_from_hex, srgb_from_linear
 from hairkit.errors import InputError
 from hairkit.options import option
 from hairkit.types.edits import Edits
@@ -35,8 +35,8 @@ class ChosenHair:
     def __post_init__(self) -> None:
         for name in ("root_colour", "tip_colour"):
             said = getattr(self, name)
-            if said is not None and not re.fullmatch("#[0-9a-fA-F]{6}", said):
-                raise InputError(f"{name} is {said!r}, expected sRGB as #rrggbb")
+            if said is not None:
+                linear_from_hex(said, name)
         if bool(self.curl_radius_mm) and self.curl_pitch_mm is None:
             raise InputError("curl_radius_mm needs curl_pitch_mm, the length of one turn")
 
@@ -61,13 +61,14 @@ class ChosenHair:
 
     def material(self, measured: HairMaterial) -> HairMaterial:
         """Return the material with the colours and the width that were chosen."""
-        root, tip, width = self.root_colour, self.tip_colour, self.width_mm
-        return replace(
-            measured,
-            root_colour=measured.root_colour if root is None else _linear(root),
-            tip_colour=measured.tip_colour if tip is None else _linear(tip),
-            width=measured.width if width is None else width * _MILLIMETRE,
-        )
+        known: dict[str, Any] = {
+            name: linear_from_hex(said, name)
+            for name in ("root_colour", "tip_colour")
+            if (said := getattr(self, name)) is not None
+        }
+        if self.width_mm is not None:
+            known["width"] = self.width_mm * _MILLIMETRE
+        return replace(measured, **known)
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +87,3 @@ class Chosen:
 def _srgb(linear: Float32Array) -> str:
     levels = np.rint(255 * np.clip(srgb_from_linear(linear), 0, 1)).astype(int)
     return "#" + "".join(f"{level:02x}" for level in levels)
-
-
-def _linear(colour: str) -> Float32Array:
-    srgb = np.array(list(bytes.fromhex(colour[1:]))) / 255
-    return np.asarray(linear_from_srgb(srgb), np.float32)

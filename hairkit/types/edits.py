@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from hairkit.arrays import Float32Array, freeze
+from hairkit.colour import linear_from_hex
 from hairkit.errors import DataError, FormatError, InputError
 from hairkit.options import make_options, option
 from hairkit.storage import Stored, read_bytes, write_text
@@ -38,7 +39,11 @@ class Brush:
     group: str = option(
         GROUPS[0], choices=GROUPS, doc="The hair that it acts on: of the head, or planted."
     )
+    colour: str = option("#7a4a2a", doc="What it dyes hair with, sRGB as #rrggbb.")
     mirror: bool = option(False, doc="Do the same on the other side of the head.")
+
+    def __post_init__(self) -> None:
+        linear_from_hex(self.colour, "colour")
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from hairkit.types.tie import Tie
 
 _VERSION, _NEWEST = "hairkit_groom", 1
 _STRANDS = "strands."
-_AT_TOP = ("points", "offsets", "widths", "root_uv", "group", "guide")
+_AT_TOP = ("points", "offsets", "widths", "root_uv", "group", "guide", "colours")
 
 
 _BROWN = (0.16, 0.11, 0.08)

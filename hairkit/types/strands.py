@@ -47,6 +47,8 @@ class Strands(Previewed, Stored):
     """(S,) group number, for engines that shade or simulate groups apart."""
     guide: BoolArray | None = None
     """(S,) true for guides, false for interpolated hair."""
+    colours: Float32Array | None = None
+    """(P, 3) linear RGB in [0, 1]; None: the ramp of the groom's material."""
 
     def __post_init__(self) -> None:
         points = freeze(self, "points", np.float32, (None, 3), "strand points")
@@ -62,6 +64,7 @@ class Strands(Previewed, Stored):
         freeze(self, "root_uv", np.float32, (count, 2))
         freeze(self, "group", np.int32, (count,))
         freeze(self, "guide", np.bool_, (count,))
+        freeze(self, "colours", np.float32, (total, 3))
 
     def __len__(self) -> int:
         return len(self.offsets) - 1
@@ -151,10 +154,11 @@ class Strands(Previewed, Stored):
             None if self.root_uv is None else self.root_uv[index],
             None if self.group is None else self.group[index],
             None if self.guide is None else self.guide[index],
+            None if self.colours is None else self.colours[rows],
         )
 
     def resampled(self, count: int) -> Strands:
-        """Return strands of `count` points at equal arc length; ends stay, widths are mixed."""
+        """Return strands of `count` points at equal arc length; ends stay, the rest is mixed."""
         if count < 2:
             raise DataError(f"a strand needs at least 2 points, got {count}")
         return self._at(np.full(len(self), count))
@@ -176,7 +180,8 @@ class Strands(Previewed, Stored):
         after, t = self.places(counts, shares)
         points = _mix(self.points, after, t[:, None])
         widths = None if self.widths is None else _mix(self.widths, after, t)
-        return replace(self, points=points, offsets=offsets, widths=widths)
+        colours = None if self.colours is None else _mix(self.colours, after, t[:, None])
+        return replace(self, points=points, offsets=offsets, widths=widths, colours=colours)
 
     def moved_and_resampled(self, frames: Float32Array, count: int) -> Float32Array:
         """Return frames (T, P, 3) of these strands at the points (T, S count, 3) of `resampled`.

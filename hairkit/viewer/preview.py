@@ -203,8 +203,7 @@ class Preview:
         return self.frame_renderer.read()
 
     def _look(self, smooth: bool, share: float, *, sample: bool) -> HairLook | None:
-        session, material = self.session, self.session.opened.groom.material
-        shown = session.shown
+        session, shown = self.session, self.session.shown
         guides = len(session.body.guides)
         if shown.colours not in ("hair", "direction"):
             return None
@@ -213,8 +212,6 @@ class Preview:
         return HairLook(
             count,
             smooth or (count <= MIN_SMOOTH and not sample),
-            _triple(material.root_colour),
-            _triple(material.tip_colour),
             by_direction=shown.colours == "direction",
             wider=GUIDE_WIDTH_SCALE if shown.guides_only else None,
         )
@@ -338,8 +335,3 @@ def _guide_lines(rows: Any, colours: Any) -> LineSet:
     rgba = np.ones((count * points, 4), np.float32)
     rgba[:, :3] = np.asarray(colours, np.float32).reshape(-1, 3)
     return LineSet(rows.reshape(-1, 3), np.arange(count + 1) * points, rgba)
-
-
-def _triple(colour: Any) -> tuple[float, float, float]:
-    red, green, blue = (float(value) for value in colour)
-    return red, green, blue

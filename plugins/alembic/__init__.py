@@ -43,6 +43,7 @@ FORMAT = FileFormat(
         Feature.GROUP,
         Feature.GUIDE,
         Feature.COLOUR,
+        Feature.COLOURS,
     },
     partial={Feature.ANIMATION: "written; the first frame is read"},
     written={Feature.GUIDE_WEIGHTS, Feature.DENSITY},

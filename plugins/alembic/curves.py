@@ -12,9 +12,9 @@ from hairkit.errors import InputError
 from hairkit.grooming.guide_weights import GuideWeights, closest_guides, guide_mask
 from hairkit.grooming.prepare_export import PreparedGroom
 from hairkit.io.coordinate_space import FileSpace
-from hairkit.io.strand_blocks import Profile, colours
 from hairkit.types.groom import HairMaterial
 from hairkit.types.point_cache import PointCache
+from hairkit.types.strand_blocks import Profile, colours
 from hairkit.types.strands import GROUP_NAMES, Strands
 
 from .options import Options
@@ -93,7 +93,7 @@ def groom_curves(ready: PreparedGroom, options: Options) -> GroomCurves:
         widths=fitted.widths / np.float32(space.metres),
         root_uv=fitted.root_uv,
         density=ready.groom.root_density,
-        colour=colours(ready.groom.material, fitted.counts),
+        colour=colours(ready.groom.material, fitted),
         # Unreal expects 0, 1, 2, ...
         group=np.unique(group, return_inverse=True)[1].astype(np.int32) if unreal else group,
         group_names=[GROUP_NAMES.get(number, f"hair_{number}") for number in group.tolist()],

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from hairkit.errors import FormatError
-from hairkit.grooming.adopt_strands import adopt, mean_look, plain_widths
+from hairkit.grooming.adopt_strands import adopt, plain_widths
 from hairkit.grooming.curve_sets import join_sets, strands_of
 from hairkit.types.groom import Groom
 
@@ -36,5 +36,5 @@ def read_groom(path: Path, options: Options) -> Groom:
     widths = found.widths
     if widths is not None:
         widths = plain_widths(widths, space.metres, path)
-    strands, kept = strands_of(replace(found, points=points, widths=widths), path)
-    return adopt(strands, options, path, mean_look(strands, kept.colour))
+    strands, _ = strands_of(replace(found, points=points, widths=widths), path)
+    return adopt(strands, options, path)

@@ -39,6 +39,7 @@ FORMAT = FileFormat(
     (".cards.glb", ".cards.obj", ".vrm"),
     written={
         Feature.HEAD, Feature.MAPS, Feature.SKIN, Feature.CAPSULES, Feature.COLOUR,
+        Feature.COLOURS,
         Feature.PHYSICS,
     },
 )  # fmt: skip

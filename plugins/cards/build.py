@@ -71,7 +71,7 @@ def build_cards(groom: Groom, options: Options) -> CardSet:
     for cards, at in zip(levels, places, strict=True):
         paint(atlas, strands, widths, cards, at, places[0].texel / at.texel)
     meshes = [_mesh(cards, at, options.atlas) for cards, at in zip(levels, places, strict=True)]
-    return CardSet(meshes, encode_maps(atlas, groom.material), courses)
+    return CardSet(meshes, encode_maps(atlas, strands, groom.material), courses)
 
 
 def _mesh(cards: Cards, at: Places, edge: int) -> Level:

@@ -13,8 +13,10 @@ from hairkit.arrays import Float32Array, UInt8Array
 from hairkit.colour import srgb_from_linear
 from hairkit.parallel import thread_count
 from hairkit.types.groom import HairMaterial
+from hairkit.types.strand_blocks import colours
+from hairkit.types.strands import Strands
 
-from .painting import SHADES, UNIT, Atlas, Int8Array
+from .painting import UNIT, Atlas, Int8Array
 
 DARKEST = 0.7
 """Brightness of the darkest strand, of the material's."""
@@ -22,23 +24,26 @@ DEPTH = 0.02
 """Metres from black to white of the depth map; grey is the card."""
 FASTEST = [cv2.IMWRITE_PNG_COMPRESSION, 1]
 """zlib's quickest: level 3 takes twice the time for 4 % less."""
-SCATTER = 97
-"""Step from one shade to the next strand's; prime to their number, so that all are used."""
+SHADES, SCATTER = 251, 97
+"""Shades by which strands differ, a prime number, and the step from one to the next strand's: so
+all are used, and neighbours in a lock get different ones."""
+PLACES = 32
+"""Places along a strand whose colours differ."""
 ZERO = 128
 """Byte of 0 in pictures of directions."""
 BAND = 256
 """Rows that are finished at once."""
 
 
-def encode_maps(atlas: Atlas, material: HairMaterial) -> dict[str, bytes]:
+def encode_maps(atlas: Atlas, strands: Strands, material: HairMaterial) -> dict[str, bytes]:
     """Return the PNG of each map: `albedo` with coverage as alpha, and the others by name."""
     pictures: dict[str, Callable[[], UInt8Array]] = {
-        "albedo": partial(_albedo, atlas, material),
+        "albedo": partial(_albedo, atlas, strands, material),
         "alpha": lambda: np.rint(255 * atlas.alpha).astype(np.uint8),
         "normal": partial(_directions, atlas.normal, outward=True),
         "flow": partial(_directions, atlas.flow, outward=False),
         "depth": partial(_depth, atlas),
-        "id": lambda: atlas.shade,
+        "id": lambda: (atlas.strand % SHADES).astype(np.uint8),
     }
     with ThreadPoolExecutor(thread_count()) as pool:
         return dict(
@@ -46,24 +51,20 @@ def encode_maps(atlas: Atlas, material: HairMaterial) -> dict[str, bytes]:
         )
 
 
-def _albedo(atlas: Atlas, material: HairMaterial) -> UInt8Array:
-    """Return (H, W, 4) BGRA: the material's colour at the strand's place and shade."""
-    share = np.linspace(0, 1, 256, dtype=np.float32)[:, None, None]
-    bright = np.linspace(DARKEST, 1, SHADES, dtype=np.float32)[None, :, None]
-    linear = ((1 - share) * material.root_colour + share * material.tip_colour) * bright
+def _albedo(atlas: Atlas, strands: Strands, material: HairMaterial) -> UInt8Array:
+    """Return (H, W, 4) BGRA: the strand's colour at its place; neighbours' are unequally bright."""
+    places = np.rint(np.linspace(0, 1, PLACES) * (strands.counts[:, None] - 1)).astype(np.int64)
+    own = colours(material, strands).at()[strands.offsets[:-1, None] + places]
+    step = np.arange(len(strands)) * SCATTER % SHADES / (SHADES - 1)
+    linear = own * (DARKEST + (1 - DARKEST) * step)[:, None, None]
     table = np.rint(255 * srgb_from_linear(np.clip(linear, 0, 1))).astype(np.uint8)
+    column = np.rint(np.linspace(0, PLACES - 1, 256)).astype(np.uint8)
     out = np.empty((*atlas.alpha.shape, 4), np.uint8)
     for first in range(0, len(out), BAND):
         rows = slice(first, first + BAND)
-        out[rows, :, :3] = table[..., ::-1][atlas.share[rows], _scattered(atlas.shade[rows])]
+        out[rows, :, :3] = table[..., ::-1][atlas.strand[rows], column[atlas.share[rows]]]
         out[rows, :, 3] = np.rint(255 * atlas.alpha[rows])
     return out
-
-
-def _scattered(number: UInt8Array) -> UInt8Array:
-    """Return the shades of strands: neighbours' numbers are far apart."""
-    table = (np.arange(256) * SCATTER % SHADES).astype(np.uint8)
-    return table[number]
 
 
 def _directions(parts: Int8Array, *, outward: bool) -> UInt8Array:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.arrays import Float32Array, Float64Array, Int64Array, UInt8Array
+from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array, UInt8Array
 from hairkit.parallel import compiled, compiled_with, parallel_for
 from hairkit.types.strands import Strands
 
@@ -29,8 +29,6 @@ UNIT = 127
 """What stands for 1 in directions of signed bytes."""
 MIN_CARDS = 16
 """Least number of cards that are worth another thread."""
-SHADES = 251
-"""Prime number of shades by which strands differ; neighbours in a lock get different ones."""
 
 
 class Atlas(NamedTuple):
@@ -42,8 +40,8 @@ class Atlas(NamedTuple):
     """Metres above the middle of the lock, of the hair that is seen."""
     share: UInt8Array
     """255 times the way along the strand, 0 at its root."""
-    shade: UInt8Array
-    """Number of the strand, 0 to 250."""
+    strand: Int32Array
+    """Number of the strand."""
     flow: Int8Array
     """(H, W, 2) 127 times the unit direction across and along the card."""
     normal: Int8Array
@@ -77,7 +75,7 @@ def blank_atlas(edge: int) -> Atlas:
         np.zeros(square, np.float32),
         np.full(square, -np.inf, np.float32),
         np.zeros(square, np.uint8),
-        np.zeros(square, np.uint8),
+        np.zeros(square, np.int32),
         np.zeros((*square, 2), np.int8),
         np.zeros((*square, 2), np.int8),
     )
@@ -138,7 +136,7 @@ def _lay_ground(card: int, sheet: _Sheet, atlas: Atlas) -> None:
     for y in range(rows):
         for x in range(columns):
             atlas.share[y0 + y, x0 + x] = int(255 * (y + 0.5) / rows)
-            atlas.shade[y0 + y, x0 + x] = SHADES // 2
+            atlas.strand[y0 + y, x0 + x] = sheet.order[sheet.first[card]]
             atlas.flow[y0 + y, x0 + x, 1] = UNIT
 
 
@@ -245,7 +243,7 @@ def _line(
             if a >= COVERED and height > atlas.height[cy, cx]:
                 atlas.height[cy, cx] = height
                 atlas.share[cy, cx] = int(255 * share)
-                atlas.shade[cy, cx] = strand % SHADES
+                atlas.strand[cy, cx] = strand
                 atlas.flow[cy, cx, 0] = int(UNIT * tx)
                 atlas.flow[cy, cx, 1] = int(UNIT * ty)
                 atlas.normal[cy, cx, 0] = int(UNIT * nx)

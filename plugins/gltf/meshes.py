@@ -14,12 +14,12 @@ from hairkit.grooming.guide_weights import guide_mask
 from hairkit.head_model.bust import CLOTH, Bust
 from hairkit.io.glb_document import INDICES, Document, index_type
 from hairkit.io.glb_skin import ROUGHNESS_CHANNEL
-from hairkit.io.strand_blocks import shares
 from hairkit.io.streamed import Streamed, at_points, repeat_row, segments
 from hairkit.io.textures import grey
 from hairkit.types.groom import Groom
 from hairkit.types.skin import SkinMaps, Texture
 from hairkit.types.skin_look import SkinLook
+from hairkit.types.strand_blocks import colours, shares
 from hairkit.types.strands import Strands
 
 from .strips import HairMesh
@@ -90,8 +90,6 @@ class Meshes:
     def hair(self, mesh: HairMesh, material: int, level: int) -> int:
         """Add strips and return their mesh."""
         add, ribbons = self.document.accessor, mesh.ribbons
-        look, v = self.groom.material, ribbons.uv[:, 1:]
-        mixed = (look.root_colour * (1 - v) + look.tip_colour * v) * mesh.shade[:, None]
         attributes = {
             "POSITION": add(ribbons.vertices, bounds=True),
             "NORMAL": add(ribbons.normals),
@@ -99,7 +97,7 @@ class Meshes:
             "TEXCOORD_0": add(ribbons.uv),
             "TEXCOORD_1": add(_upside_down(mesh.root_uv)),
             "COLOR_0": add(
-                _bytes(mixed / np.maximum(brightest(self.groom), 1e-6)), normalised=True
+                _bytes(mesh.colour / np.maximum(brightest(self.groom), 1e-6)), normalised=True
             ),
             **self._skin(len(ribbons.vertices)),
         }
@@ -118,40 +116,49 @@ class Meshes:
                 raise InputError("the groom has no guides; choose lines=all or lines=none")
             shapes = shapes[:, keep[groom.strands.strand_of_point]]
             groom = groom.select(keep)
-        strands, add = groom.strands, self.document.accessor
+        strands, own = groom.strands, groom.strands.colours
+        attributes, described = self._line_attributes(strands)
+        colour = brightest(groom) if own is None else np.ones(3)
+        index = segments(strands, index_type(len(strands.points)))
+        primitive = {
+            "attributes": attributes,
+            "indices": self.document.accessor(index, INDICES),
+            "material": _plain(self.document, "guides", colour),
+            "mode": LINES,
+            "extras": {"hairkit": described},
+        }
+        return self._with_shapes("guides", primitive, shapes)
+
+    def _line_attributes(self, strands: Strands) -> tuple[dict[str, int], dict[str, Any]]:
+        """Return what stands at every point, and what is the same for all strands."""
+        add, counts, widths, own = (
+            self.document.accessor, strands.counts, strands.widths, strands.colours,
+        )  # fmt: skip
         attributes = {
             "POSITION": add(strands.points, bounds=True),
             "_STRAND_ID": add(_at_points(strands, np.arange(len(strands)))),
             "_STRAND_T": add(_shares(strands)),
         }
         described: dict[str, Any] = {"strands": len(strands)}
-        if (strands.counts == strands.counts[0]).all():
-            described["points_per_strand"] = int(strands.counts[0])
+        if (counts == counts[0]).all():
+            described["points_per_strand"] = int(counts[0])
         else:
             described["offsets"] = strands.offsets.tolist()
-        if strands.widths is not None:
-            widths = strands.widths
-            attributes["_RADIUS"] = add(
-                at_points(strands, np.float32, lambda block: widths[block.points] / 2)
-            )
+        if widths is not None:
+            radius = at_points(strands, np.float32, lambda block: widths[block.points] / 2)
+            attributes["_RADIUS"] = add(radius)
+        if own is not None:
+            attributes["COLOR_0"] = add(at_points(strands, np.float32, lambda b: own[b.points], 3))
         if strands.root_uv is not None:
             # a scalar each: Blender 4.5 mixes up custom attributes of different widths
-            u, v = _upside_down(strands.root_uv).T
-            attributes |= {"_ROOT_U": add(_at_points(strands, u))}
-            attributes |= {"_ROOT_V": add(_at_points(strands, v))}
+            for name, column in zip("UV", _upside_down(strands.root_uv).T, strict=True):
+                attributes[f"_ROOT_{name}"] = add(_at_points(strands, column))
         for name, values in (("group", strands.group), ("guide", strands.guide)):
             if values is not None and (values == values[0]).all():
                 described[name] = values[0].item()
             elif values is not None:
                 attributes[f"_{name.upper()}"] = add(_at_points(strands, values))
-        primitive = {
-            "attributes": attributes,
-            "indices": add(segments(strands, index_type(len(strands.points))), INDICES),
-            "material": _plain(self.document, "guides", brightest(groom)),
-            "mode": LINES,
-            "extras": {"hairkit": described},
-        }
-        return self._with_shapes("guides", primitive, shapes)
+        return attributes, described
 
     def _with_shapes(
         self,
@@ -213,9 +220,9 @@ def _bytes(colour: npt.NDArray[Any]) -> UInt8Array:
 
 
 def brightest(groom: Groom) -> Float64Array:
-    """Return (3,) the brighter of root and tip in each channel, which vertex colours darken."""
-    look = groom.material
-    return np.clip(np.maximum(look.root_colour, look.tip_colour).astype(np.float64), 0, 1)
+    """Return (3,) the brightest colour of the hair in each channel, which vertex colours darken."""
+    rows = colours(groom.material, groom.strands).rows
+    return np.asarray(np.clip(rows.max(axis=0, initial=0), 0, 1), np.float64)
 
 
 def _plain(document: Document, name: str, colour: Float64Array) -> int:

@@ -122,6 +122,9 @@ def _part(
     if u is not None and v is not None:
         # glTF counts v from the top of the picture, this project upwards
         uv = np.stack([u, 1 - v], axis=1)[custom.first]
+    shade = file.numbers(attributes["COLOR_0"]) if "COLOR_0" in attributes else None
+    if shade is not None and (len(shade) != len(points) or not np.isfinite(shade).all()):
+        raise ValueError("COLOR_0 is not a finite colour for each point")
     if radius is not None and (radius < 0).any():
         raise ValueError("a radius is below 0")
     return CurveSet(
@@ -129,7 +132,7 @@ def _part(
         counts,
         None if radius is None else (2 * radius).astype(np.float32),
         None if uv is None else uv.astype(np.float32),
-        None,
+        None if shade is None else shade[order, :3].astype(np.float32),
         custom.of_strands("group"),
         custom.of_strands("guide"),
     )

@@ -9,7 +9,7 @@ import numpy as np
 
 from hairkit.arrays import Float32Array
 from hairkit.grooming.guide_weights import follow, guide_mask
-from hairkit.grooming.prepare_export import bound_roots, dense_groom
+from hairkit.grooming.prepare_export import bound_roots, dense_groom, point_colours
 from hairkit.types.groom import Groom
 
 from .options import Options
@@ -38,8 +38,8 @@ class HairMesh:
     ribbons: Ribbons
     root_uv: Float32Array
     """(V, 2) of the strip's root, v upwards."""
-    shade: Float32Array
-    """(V,) how bright the strip is, up to 1."""
+    colour: Float32Array
+    """(V, 3) linear RGB; some strips are a little darker."""
     shapes: Float32Array
     """(M, V, 3) shifts from rest."""
 
@@ -86,6 +86,7 @@ def _denser(
         points=rest,
         offsets=np.arange(len(guides.strands) + 1) * points,
         widths=None,
+        colours=even.moved(point_colours(guides)).reshape(-1, 3),
     )
     dense = dense_groom(replace(guides, strands=strands), wanted, options.seed)
     # the first frame is rest itself, which following may round
@@ -111,10 +112,11 @@ def _level(
     strip = beside // points
     uv = strands.root_uv if strands.root_uv is not None else bound_roots(groom).uv
     shade = np.random.default_rng(options.seed).uniform(_DIMMEST, 1, len(locks.strand))
+    colour = locks.moved(point_colours(groom)).reshape(-1, 3)[beside] * shade[strip, None]
     return HairMesh(
         ribbons,
         uv[locks.strand][strip],
-        shade[strip].astype(np.float32),
+        colour.astype(np.float32),
         np.stack(moved) if moved else np.zeros((0, len(beside), 3), np.float32),
     )
 

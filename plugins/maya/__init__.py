@@ -28,10 +28,10 @@ from hairkit.hookspecs import hookimpl
 from hairkit.io.coordinate_space import SPACES, FileSpace, SpaceOptions
 from hairkit.io.file_format import Feature, FileFormat
 from hairkit.io.number_text import format_rows
-from hairkit.io.strand_blocks import blocks
 from hairkit.options import option
 from hairkit.storage import read_text, write_pieces
 from hairkit.types.groom import Groom
+from hairkit.types.strand_blocks import blocks
 from hairkit.types.strands import Strands
 
 FORMAT = FileFormat(

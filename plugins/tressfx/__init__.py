@@ -21,7 +21,6 @@ from hairkit.arrays import Float32Array
 from hairkit.grooming.adopt_strands import (
     ImportOptions,
     adopt,
-    mean_look,
     plain_widths,
 )
 from hairkit.grooming.curve_sets import CurveSet, strands_of
@@ -50,6 +49,7 @@ FORMAT = FileFormat(
     partial={
         Feature.POINTS: "resampled to `points_per_strand`, ends kept",
         Feature.WIDTHS: "mean of each strand",
+        Feature.COLOURS: "resampled to `points_per_strand`",
     },
     written={Feature.SKIN},
 )
@@ -92,8 +92,8 @@ def import_groom(path: Path, options: Options) -> Groom:
         uv = _flip_v(hair.uv, options)
     if hair.colours is not None:
         colours = hair.colours.reshape(-1, 3)
-    strands, kept = strands_of(CurveSet(points, counts, widths, uv, colours), path)
-    return adopt(strands, options, path, mean_look(strands, kept.colour))
+    strands, _ = strands_of(CurveSet(points, counts, widths, uv, colours), path)
+    return adopt(strands, options, path)
 
 
 def _resample(groom: Groom, count: int) -> Groom:

@@ -10,8 +10,8 @@ import numpy as np
 from hairkit.arrays import Float32Array
 from hairkit.io.byte_writer import as_bytes, join_bytes
 from hairkit.io.coordinate_space import FileSpace
-from hairkit.io.strand_blocks import blocks, colours
 from hairkit.types.groom import Groom
+from hairkit.types.strand_blocks import blocks, colours
 
 from .binary import HEADER, VERSION
 
@@ -55,7 +55,7 @@ def tfx_pieces(
     yield as_bytes("<f4", np.zeros(_padding(len(strands))))
     if coloured:
         alpha = ((0, 0), (0, 1))
-        shades = colours(groom.material, strands.counts).mapped(
+        shades = colours(groom.material, strands).mapped(
             lambda linear: np.pad(linear, alpha, constant_values=1)
         )
         for block in blocks(strands):

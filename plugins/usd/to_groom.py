@@ -12,7 +12,7 @@ import numpy as np
 
 from hairkit.arrays import Int64Array
 from hairkit.errors import FormatError, InputError
-from hairkit.grooming.adopt_strands import ImportOptions, adopt, mean_look
+from hairkit.grooming.adopt_strands import ImportOptions, adopt
 from hairkit.grooming.curve_sets import (
     VERTEX,
     CurveSet,
@@ -55,7 +55,7 @@ def read_groom(path: Path, options: Any) -> Groom:
     strands, kept = strands_of(join_sets(every), path)
     with readable(path, "USD groom"):
         look, physics = settings.get("material"), made(HairPhysics, settings.get("physics", {}))
-        material = made(HairMaterial, look) if look else mean_look(strands, kept.colour)
+        material = made(HairMaterial, look) if look else None
         ties = ties_of(settings)
     groom = replace(adopt(strands, options, path, material, head), physics=physics, ties=ties)
     return _bound(groom, kept, options) if head is not None else groom

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from hairkit.cli import main
 from hairkit.grooming.brushed_hair import CLEARANCE
 from hairkit.grooming.brushes import BRUSHES, edit_groom
 from hairkit.grooming.density import SHORTER, USUAL
+from hairkit.grooming.prepare_export import point_colours
 from hairkit.head_model.scalp import evaluate
 from hairkit.head_model.signed_distance import distance_to
 from hairkit.manager import Manager
@@ -69,13 +71,13 @@ def test_a_brush_acts_on_its_group_alone(brush: str, group: str) -> None:
     path = EVERYWHERE if brush not in ("comb", "part") else np.concatenate([DOWN, -DOWN])
     stroke = Edit(path, Brush(brush, 0.1, group=group))
     after = edit_groom(before, Edits((stroke,)))
-    kept = [
-        each.strands.select(each.strands.planted == (group == "hair")).points
-        for each in (before, after)
-    ]
-    np.testing.assert_array_equal(*kept)
+    dyed = [replace(each.strands, colours=point_colours(each)) for each in (before, after)]
+    kept = [each.select(each.planted == (group == "hair")) for each in dyed]
+    np.testing.assert_array_equal(*[each.points for each in kept])
+    np.testing.assert_array_equal(*[each.colours for each in kept])
     if brush not in ("add", "trim") or group == "hair":
-        assert not np.array_equal(before.strands.points, after.strands.points)
+        points, colours = ([getattr(e, of) for e in dyed] for of in ("points", "colours"))
+        assert not np.array_equal(*(colours if brush == "dye" else points))
 
 
 @pytest.mark.parametrize("name", ["alembic", "ply", "usd", "maya", "native", "gltf"])

@@ -98,6 +98,7 @@ def comes_back(feature: Feature, back: Groom, true: Groom) -> bool:
             back.head.capsules, true.head.capsules, ("first", "second", "radius")
         ),
         Feature.COLOUR: same_values(back.material, true.material, ("root_colour", "tip_colour")),
+        Feature.COLOURS: close(strands.colours, wanted.colours),
         Feature.CURL: same_values(back.material, true.material, ("curl_radius", "curl_pitch")),
         Feature.PHYSICS: same_values(back.physics, true.physics, tuple(vars(HairPhysics()))),
     }[feature]
@@ -122,6 +123,7 @@ def is_lost(feature: Feature, back: Groom, true: Groom) -> bool:
         Feature.SKIN: not close(back.head.joints, true.head.joints),
         Feature.CAPSULES: not same_values(back.head.capsules, true.head.capsules, ("first",)),
         Feature.COLOUR: same_values(back.material, HairMaterial(), ("root_colour", "tip_colour")),
+        Feature.COLOURS: strands.colours is None,
         Feature.CURL: back.material.curl_radius == 0,
         Feature.PHYSICS: vars(back.physics) == vars(HairPhysics()),
     }[feature]

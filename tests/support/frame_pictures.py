@@ -19,12 +19,16 @@ from hairkit.viewer.draw.place_kernels import MOST_STRETCH, PARTED, TOGETHER
 
 GROOM = bristle_groom()
 CAMERA = Camera.on_turn(20.0, distance=0.6, focal=260.0, width=160, height=120)
-LOOK = HairLook(3000, True, (0.4, 0.05, 0.05), (0.4, 0.05, 0.05))
+LOOK = HairLook(3000, True)
+RED, GREEN = (0.4, 0.05, 0.05), (0.05, 0.4, 0.05)
 
 
-def make_frame_renderer(gl: Renderer, *, soft: bool) -> FrameRenderer:
-    """Return a frame renderer with the ball head and 3000 bristles."""
-    body = HairBody.of(GROOM, 3000)
+def make_frame_renderer(
+    gl: Renderer, *, soft: bool, colour: tuple[float, float, float] = RED
+) -> FrameRenderer:
+    """Return a frame renderer with the ball head and 3000 bristles of a colour."""
+    look = replace(GROOM.material, root_colour=np.array(colour), tip_colour=np.array(colour))
+    body = HairBody.of(replace(GROOM, material=look), 3000)
     return FrameRenderer(gl, head_solid(GROOM.head, GROOM.material), body, soft)
 
 

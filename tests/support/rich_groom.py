@@ -6,13 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from hairkit.arrays import Float32Array
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom, HairMaterial, HairPhysics
 from hairkit.types.head import Capsules
 from hairkit.types.skin import Blendshape, SkinMaps, Texture
+from hairkit.types.strand_blocks import colours
 from hairkit.types.strands import Strands
 from hairkit.types.tie import Tie
 
+LOOK = HairMaterial(np.array([0.3, 0.2, 0.1]), np.array([0.6, 0.4, 0.3]), 7e-5, 0.002, 0.011)
 _MAP_SIZES = ((8, 8), (8, 8, 3), (8, 8))
 """Of roughness, normal and bump."""
 
@@ -46,19 +49,26 @@ def rich_groom(strands: int = 40) -> Groom:
             *(Texture.encode(rng.integers(0, 255, size, np.uint8)) for size in _MAP_SIZES),
         ),
         blendshapes=tuple(
-            Blendshape(name, rng.normal(0, 1e-3, bare.head.vertices.shape).astype(np.float32))
+            Blendshape(name, rng.normal(0, 1e-3, bare.head.vertices.shape))
             for name in ("smile", "jaw_open")
         ),
     )
     return Groom(
-        packed,
+        replace(packed, colours=_streaked(packed)),
         head,
         bare.root_triangle[index],
         bare.root_barycentric[index],
-        HairMaterial(np.array([0.3, 0.2, 0.1]), np.array([0.6, 0.4, 0.3]), 7e-5, 0.002, 0.011),
+        LOOK,
         HairPhysics(0.31, 0.72, 0.023, 0.17, 9.0),
         (Tie(np.array([0.1, 0.2, -0.4]), np.array([0.6, 0.0, -0.8]), 0.011, "braid"),),
     )
+
+
+def _streaked(strands: Strands) -> Float32Array:
+    """Return colours (P, 3) that differ by strand; roots and tips have LOOK's in the mean."""
+    streak = np.linspace(-0.05, 0.05, len(strands), dtype=np.float32)
+    own: Float32Array = colours(LOOK, strands).at() + streak[strands.strand_of_point, None]
+    return own
 
 
 def with_degenerate(groom: Groom) -> Groom:

@@ -10,7 +10,7 @@ const float u_perspective = 1.0;
 const vec3 u_forward = vec3(0.0);
 ${shading}
 uniform sampler2D u_hair;      // (points * columns, rows) rest positions
-uniform sampler2D u_moved;     // (points, guides) displacement of every guide's points
+uniform sampler2D u_moved;     // (points, guides) displacement of every guide's points; their packed colour
 uniform mat4 u_clip_from_head;
 uniform vec2 u_layout;         // points of a strand, strands in a row of u_hair
 uniform float u_width, u_taper, u_pixel;
@@ -31,7 +31,12 @@ void main() {
   vec3 along = place(min(point + 1, points - 1)) - place(max(point - 1, 0));
   vec3 here = place(point), tangent = normalize(along + vec3(0.0, 1e-9, 0.0));
   float share = float(point) / float(points - 1);
-  v_colour = seen_colour(here, tangent, share, fract(float(gl_InstanceID) * 0.61803399));
+  vec3 own = vec3(0.0);
+  for (int k = 0; k < 3; ++k) {
+    float bits = texelFetch(u_moved, ivec2(point, int(a_carriers[k])), 0).w;
+    own += a_weights[k] * unpacked(floatBitsToUint(bits));
+  }
+  v_colour = seen_colour(here, tangent, own, fract(float(gl_InstanceID) * 0.61803399));
   vec3 side = normalize(cross(tangent, u_eye - here));
   float depth = (u_clip_from_head * vec4(here, 1.0)).w;
   float width = max(u_width * (1.0 - u_taper * pow(share, 4.0)), u_pixel * depth);

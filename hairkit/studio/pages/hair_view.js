@@ -11,7 +11,7 @@ const NEAR = 0.05, FAR = 10, VIEW_ANGLE = 0.5; // metres, metres, radians
 
 export function readPacket(buffer) {
   const view = new DataView(buffer);
-  if (view.getUint32(0) !== 0x484b5332) { // HKS2
+  if (view.getUint32(0) !== 0x484b5333) { // HKS3
     throw new Error("this hair is of another version of hairkit; make it again on the page Photos");
   }
   const size = view.getUint32(4, true);
@@ -43,6 +43,7 @@ export class HairView {
     const width = this.points * COLUMNS, height = Math.ceil(this.hairs / COLUMNS);
     upload(gl, this.hair, width, height, fourWide(arrays.hair.data, width * height));
     this.shift = new Float32Array(4 * this.points * arrays.guides.shape[0]);
+    this.tint(arrays.tint.data, 0);
     this.hairArray = vertexArray(gl, this.hairProgram, {
       a_carriers: [arrays.carriers.data, 3, 1], a_weights: [arrays.weights.data, 3, 1],
     });
@@ -142,6 +143,12 @@ export class HairView {
       gl.bindVertexArray(array);
       gl.drawElements(gl.TRIANGLES, corners, gl.UNSIGNED_INT, 0);
     }
+  }
+
+  // Takes packed colours of points of the guides, from one of them on.
+  tint(packed, first) {
+    const bits = new Uint32Array(this.shift.buffer);
+    packed.forEach((value, k) => { bits[4 * (first + k) + 3] = value; });
   }
 
   // Sends how far every point of the guides has moved.

@@ -46,8 +46,9 @@ def stroke(session: Session, x: float, y: float) -> None:
 @action()
 def lift(session: Session) -> None:
     """Lift the brush; the stroke is kept."""
-    _taken(session).lift()
-    if len(_taken(session).hair.points) != len(session.body.guides):
+    now = _taken(session)
+    now.lift()
+    if len(now.hair.points) != len(session.body.guides) or now.setting.brush == "dye":
         session.show_strokes()
 
 

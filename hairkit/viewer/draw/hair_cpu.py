@@ -76,7 +76,8 @@ class SoftHairPass:
         self._sums = np.zeros((0, 4), np.float32)
         self._picture = np.empty((0, 0, 4), np.uint8)
         self._hair_region = NOWHERE
-        self._colours: tuple[object, Float32Array] | None = None
+        mixed = np.einsum("sg,sgkc->skc", body.weights, body.colours[body.followed])
+        self._colours = shade_kernels.fibre_colours(mixed, self._random)
 
     def release(self) -> None:
         """Do nothing: there are no GPU objects."""
@@ -134,7 +135,7 @@ class SoftHairPass:
         light = shading_of(view.camera, scene.lights, scene.light.grid, scene.light.array)
         around = shade_kernels.light_around(scene.lights)
         shading = HairShading(
-            light, self._fibres(look), self._random, around, look.by_direction, self._tones
+            light, self._colours, self._random, around, look.by_direction, self._tones
         )
         lit = self._state, self._cells.opacity, self._strokes, shading, columns
         parallel_for(shade_kernels.shade_hair, look.hairs, *lit, min_chunk=PIECE)
@@ -173,10 +174,3 @@ class SoftHairPass:
             scale /= max(view.hair_depth.near, NEAREST)
         widest = float(self.body.widths.max(initial=0.0)) * wider * scale
         return np.float32(min(widest, float(raster_kernels.WIDEST)) + 1)
-
-    def _fibres(self, look: HairLook) -> Float32Array:
-        key = (look.root_colour, look.tip_colour)
-        if self._colours is None or self._colours[0] != key:
-            made = shade_kernels.fibre_colours(*key, self._random, self.body.points_each)
-            self._colours = (key, made)
-        return self._colours[1]

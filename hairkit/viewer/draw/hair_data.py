@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from hairkit.errors import InputError
 from hairkit.grooming.densify import densify, roots_between
 from hairkit.grooming.guide_weights import closest_guides, guide_mask
 from hairkit.grooming.locks import strand_widths
+from hairkit.grooming.prepare_export import point_colours
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
@@ -53,6 +54,8 @@ class HairBody:
     next one, metres."""
     widths: Float32Array
     """(S, m) diameters, metres."""
+    colours: Float32Array
+    """(G, m, 3) linear RGB of the guides; the others mix theirs."""
 
     @property
     def points_each(self) -> int:
@@ -93,7 +96,9 @@ class HairBody:
         roots = np.einsum("sk,skc->sc", mix.weights, rest[:, 0][mix.guides])
         edges = np.diff(shape, axis=1, prepend=roots[:, None])
         widths = strand_widths(count, shares, groom.material.width)
-        return cls(guides, shares, rest, mix.guides, mix.weights, edges, widths)
+        coloured = replace(guides, colours=point_colours(groom)).resampled_at(shares)
+        colours = np.asarray(coloured.colours).reshape(rest.shape)
+        return cls(guides, shares, rest, mix.guides, mix.weights, edges, widths, colours)
 
 
 def split_guides(groom: Groom, most: int = MAX_GUIDES) -> tuple[Groom, Strands | None]:

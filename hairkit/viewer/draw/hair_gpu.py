@@ -16,14 +16,14 @@ from hairkit.arrays import Float32Array
 from hairkit.errors import InputError
 from hairkit.rendering.context import Renderer
 from hairkit.rendering.gl_camera import set_camera, set_uniforms
-from hairkit.rendering.hair import strand_numbers
+from hairkit.rendering.hair import packed_colours, strand_numbers
 from hairkit.types.camera import Camera
 from hairkit.viewer.draw.hair_data import HairBody
 from hairkit.viewer.draw.interface import HairLook, HairScene, HairView
 from hairkit.viewer.draw.place_kernels import SLICES, TILE
 
-_GROUP, SUMS = 64, 7
-"""Invocations of a work group; binding of the sums, as in the shaders."""
+_GROUP, COLOURS, SUMS = 64, 5, 7
+"""Invocations of a work group; bindings of guides' colours and of sums, as in the shaders."""
 _POINT, _BLOCK = 12, 64
 """Bytes of a point: three words; and of a block of sums, see viewer_accumulation.glsl."""
 _WORD, _HALF_FLOAT = 65535, 6e4
@@ -53,14 +53,15 @@ class HairPass:
         self._guides = context.buffer(reserve=_POINT * len(body.guides) * points)
         self._hairs = context.buffer(_hair_records(body))
         self._edges = context.buffer(_edge_records(body))
+        self._colours = context.buffer(packed_colours(body.colours))
         self._places = context.buffer(reserve=_POINT * count * points)
         self._view: _ViewBuffers | None = None
         self._resolve = context.vertex_array(gl.program("viewer_screen", "viewer_resolve"), [])
 
     def release(self) -> None:
         """Free the buffers."""
-        buffers = (self._rest, self._now, self._guides, self._hairs, self._edges, self._places)
-        for buffer in buffers:
+        guides = self._rest, self._now, self._guides, self._colours
+        for buffer in (*guides, self._hairs, self._edges, self._places):
             buffer.release()
         self._resolve.release()
         if self._view is not None:
@@ -108,14 +109,13 @@ class HairPass:
         self._hairs.bind_to_storage_buffer(1)
         self._edges.bind_to_storage_buffer(2)
         self._places.bind_to_storage_buffer(3)
+        self._colours.bind_to_storage_buffer(COLOURS)
         buffers.sums.bind_to_storage_buffer(SUMS)
         self._run(
             "viewer_raster",
             look.hairs,
             view,
             u_eye=tuple(view.camera.position.tolist()),
-            u_root_colour=look.root_colour,
-            u_tip_colour=look.tip_colour,
             u_show_direction=float(look.by_direction),
             u_solid_depth=1,
             u_opacity=2,

@@ -37,8 +37,6 @@ class HairLook:
     """Number of strands, the guides first."""
     smooth: bool
     """True antialiases strands; False is faster."""
-    root_colour: tuple[float, float, float]
-    tip_colour: tuple[float, float, float]
     by_direction: bool = False
     wider: float | None = None
     """Drawn over true width; None: from the number of strands."""

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.arrays import Float32Array, Int32Array
+from hairkit.arrays import Float32Array, Int32Array, UInt32Array
 from hairkit.parallel import parallel_for, thread_count
 from hairkit.rendering.context import Renderer
 from hairkit.rendering.light import Lights
@@ -21,7 +21,6 @@ from hairkit.types.preview import Surface
 from hairkit.types.strands import Strands
 from hairkit.viewer.draw.interface import HairDrawer
 from hairkit.viewer.draw.light_gpu import LightVolume, solid_depth
-from hairkit.viewer.draw.records import UInt32Array
 
 STEPS, GROWTH = 9, 1.35
 SKY_STEPS, SKY_GROWTH = 5, 1.7

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hairkit.arrays import Float32Array
+from hairkit.arrays import Float32Array, UInt32Array
 from hairkit.rendering.gl_camera import NEAREST
 from hairkit.simulation import vectors as v
 from hairkit.simulation.lanes import four, put, put_four, stage, three
@@ -22,7 +22,6 @@ from hairkit.viewer.draw.records import (
     HairState,
     Projection,
     Strokes,
-    UInt32Array,
     ViewCells,
 )
 

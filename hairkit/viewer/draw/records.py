@@ -7,14 +7,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.arrays import Float32Array, Int32Array, Int64Array
+from hairkit.arrays import Float32Array, Int32Array, Int64Array, UInt32Array
 from hairkit.rendering.gl_camera import DepthRange, clip_from_camera
 from hairkit.rendering.light import Lights
 from hairkit.simulation.vectors import Frame, Vector
 from hairkit.types.camera import Camera
 from hairkit.types.volume import VoxelGrid
 
-UInt32Array = npt.NDArray[np.uint32]
 Int8Array = npt.NDArray[np.int8]
 
 

@@ -118,18 +118,11 @@ def light_around(lights: Lights) -> Vector:
     return red, green, blue
 
 
-def fibre_colours(
-    root: tuple[float, float, float],
-    tip: tuple[float, float, float],
-    random: Float32Array,
-    points: int,
-) -> Float32Array:
-    """Return linear colours (S, points, 3) of fibres, varied by random numbers (S,)."""
-    share = np.linspace(0, 1, points, dtype=np.float32)[:, None]
-    along = np.array(root, np.float32) * (1 - share) + np.array(tip, np.float32) * share
+def fibre_colours(own: Float32Array, random: Float32Array) -> Float32Array:
+    """Return linear colours (S, m, 3) of fibres, those of their own varied by numbers (S,)."""
     power = (LEAST_POWER + POWERS * random)[:, None, None]
     bright = LEAST_BRIGHT + BRIGHTS * np.mod(random * OTHER, 1.0)
-    colours: Float32Array = along[None] ** power.astype(np.float32)
+    colours: Float32Array = own ** power.astype(np.float32)
     return np.asarray(colours * bright[:, None, None], np.float32)
 
 

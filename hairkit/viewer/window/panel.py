@@ -286,6 +286,10 @@ def _draw_option(imgui: Any, info: OptionInfo, value: Any, action: str, perform:
         flags = imgui.SliderFlags_.logarithmic if high > 1000 * max(low, 1e-9) > 0 else 0
         changed, value = imgui.slider_float(info.name, float(value), low, high, shape, flags)
         value = float(f"{value:.6g}")  # sliders are float32
+    elif str(value).startswith("#"):
+        levels = [level / 255 for level in bytes.fromhex(value[1:])]
+        changed, levels = imgui.color_edit3(info.name, levels)
+        value = "#" + bytes(round(255 * min(max(level, 0), 1)) for level in levels).hex()
     else:
         imgui.text(f"{info.name}: {value}")
     _hint(imgui, info.doc)

@@ -8,7 +8,17 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from frame_pictures import CAMERA, GROOM, LOOK, changed, inputs, make_frame_renderer, picture, twin
+from frame_pictures import (
+    CAMERA,
+    GREEN,
+    GROOM,
+    LOOK,
+    changed,
+    inputs,
+    make_frame_renderer,
+    picture,
+    twin,
+)
 
 from hairkit.arrays import Float32Array
 from hairkit.head_model.template import default_head
@@ -79,9 +89,10 @@ def test_the_head_is_drawn_in_the_first_picture_and_in_later_ones(
 
 def test_colour_is_the_materials(frame_renderer: FrameRenderer) -> None:
     """Red hair is red, green hair green."""
-    green = replace(LOOK, root_colour=(0.05, 0.4, 0.05), tip_colour=(0.05, 0.4, 0.05))
-    with renderer():
-        pictures = [picture(frame_renderer, inputs(hair=look)) for look in (LOOK, green)]
+    with renderer() as gl:
+        green = make_frame_renderer(gl, soft=bool(frame_renderer.soft), colour=GREEN)
+        pictures = [picture(drawn, inputs()) for drawn in (frame_renderer, green)]
+        green.release()
         bare = picture(frame_renderer, inputs(hair=None))
     where = changed(pictures[0], bare) & changed(pictures[1], bare)
     means = [image[where].mean(axis=0) for image in pictures]

@@ -23,7 +23,6 @@ from hairkit.viewer.session import Session
 
 GROOM = bristle_groom()
 CAMERA = Camera.on_turn(20.0, distance=0.6, focal=260.0, width=160, height=120)
-BROWN = (0.2, 0.1, 0.05)
 WALLS = "green", "white"
 
 
@@ -109,7 +108,7 @@ def curtain(count: int) -> HairBody:
 @pytest.mark.parametrize("count", [100, 1000, 10_000, 100_000])
 def test_hair_is_whole_however_many_strands_there_are(soft: bool, count: int) -> None:
     """A curtain hides the backdrop behind it; only one of a hundred strands has gaps."""
-    look = HairLook(count, False, BROWN, BROWN)
+    look = HairLook(count, False)
     wanted = FrameInputs(CAMERA, np.eye(4), None, look, show_head=False, whole_light=True)
     with renderer() as gl:
         head = head_solid(GROOM.head, GROOM.material)

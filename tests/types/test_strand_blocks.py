@@ -6,7 +6,7 @@ from rich_groom import rich_groom
 
 from hairkit.grooming.prepare_export import point_colours
 from hairkit.io import strand_blocks
-from hairkit.io.strand_blocks import blocks, bounds, colours, shares
+from hairkit.types.strand_blocks import blocks, bounds, colours, shares
 from hairkit.types.strands import Strands
 
 

@@ -81,9 +81,11 @@ def shares(counts: Int64Array) -> Profile:
     return Profile(share, first[place], counts)
 
 
-def colours(look: HairMaterial, counts: Int64Array) -> Profile:
-    """Return the profile (K, 3) of linear RGB from the root's colour to the tip's."""
-    share = shares(counts).mapped(lambda share: share.astype(np.float32)[:, None])
+def colours(look: HairMaterial, strands: Strands) -> Profile:
+    """Return linear RGB (K, 3): the strands' own or, without, from the root's to the tip's."""
+    if strands.colours is not None:
+        return Profile(strands.colours, strands.offsets[:-1], strands.counts)
+    share = shares(strands.counts).mapped(lambda share: share.astype(np.float32)[:, None])
     return share.mapped(lambda part: (1 - part) * look.root_colour + part * look.tip_colour)
 
 
