@@ -35,10 +35,12 @@ CLEARANCE, ROUNDS = 0.001, 6
 """Metres that hair keeps from the head, and times that it is moved out and set to its lengths."""
 CELL, MARGIN = 0.004, 0.02
 """Edge of the cells of a head's distances, and the room around the head, metres."""
+STUB = 0.01
+"""Share of a strand that is shown of one that a stroke under way removes."""
 UNMOVED = 1e-7
 """Metres by which a strand must move to count as changed."""
 MIRROR = np.array([-1.0, 1.0, 1.0])
-_EACH = ("points", "triangle", "barycentric", "source", "group", "colours")
+_EACH = ("points", "triangle", "barycentric", "source", "number", "group", "colours")
 
 
 class HeadRoom(NamedTuple):
@@ -115,6 +117,8 @@ class Hair:
     """(S, 3) weights of that face's corners."""
     source: Int64Array
     """(S,) strand of the groom that gives each its looks."""
+    number: Int64Array
+    """(S,) place of each in the hair that this is a copy of, -1 for new strands."""
     group: Int32Array
     """(S,) group number."""
     colours: Float32Array
@@ -142,9 +146,9 @@ class Hair:
         group = np.zeros(len(even), np.int32) if even.group is None else even.group
         points = even.points.reshape(-1, most, 3).astype(np.float64)
         bound = groom.root_triangle, groom.root_barycentric
-        source, room = np.arange(len(even)), HeadRoom.around(head)
+        number, room = np.arange(len(even)), HeadRoom.around(head)
         own = colours(groom.material, even).at().reshape(points.shape)
-        return cls(points, *bound, source, group, own, room, head.density)
+        return cls(points, *bound, number, number, group, own, room, head.density)
 
     def onto(self, groom: Groom) -> Groom:
         """Return the groom with these strands in the place of its own."""
@@ -176,6 +180,17 @@ class Hair:
         """(S, M) metres from the root."""
         return np.concatenate([np.zeros((len(self.points), 1)), self.lengths.cumsum(axis=1)], 1)
 
+    def over(self, before: Hair) -> tuple[Float64Array, Float32Array]:
+        """Return points and colours (S, M, 3) of what a stroke makes of the strands before it.
+
+        Those that it removed are stubs; those that it added are not among them.
+        """
+        points, colours = before.points.copy(), before.colours.copy()
+        points += (1 - STUB) * (points[:, :1] - points)
+        old = self.number >= 0
+        points[self.number[old]], colours[self.number[old]] = self.points[old], self.colours[old]
+        return points, colours
+
     def in_group(self, name: str) -> BoolArray:
         """Return which strands (S,) are of a group of `PLANTED`, or of none of them: `hair`."""
         if name in PLANTED:
@@ -188,7 +203,8 @@ class Hair:
 
     def copy(self) -> Hair:
         """Return hair that brushes can change while this stays."""
-        return replace(self, points=self.points.copy(), colours=self.colours.copy())
+        number = np.arange(len(self.points))
+        return replace(self, points=self.points.copy(), colours=self.colours.copy(), number=number)
 
     def take(self, index: npt.NDArray[Any]) -> Hair:
         """Return some strands, by numbers or a mask, around which are all of these."""
@@ -242,9 +258,10 @@ class Hair:
         """Add strands (N, M, 3) of a group, with the looks of those that grow nearest."""
         if self.around is not None and len(points):
             near = cKDTree(self.around.points[:, 0]).query(roots.positions)[1]
-            new = points, roots.triangle, roots.barycentric, self.around.source[near]
-            groups = np.full(len(points), group, np.int32)
-            for name, values in zip(_EACH, (*new, groups, self.around.colours[near]), strict=True):
+            of, colours = self.around.source[near], self.around.colours[near]
+            number, groups = (np.full(len(points), value, np.int32) for value in (-1, group))
+            new = points, roots.triangle, roots.barycentric, of, number, groups, colours
+            for name, values in zip(_EACH, new, strict=True):
                 setattr(self, name, np.concatenate([getattr(self, name), values]))
             self.__dict__.pop("lengths", None)
             self.moved, self.kept = (

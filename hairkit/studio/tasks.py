@@ -156,15 +156,22 @@ def edit_groom(request: dict[str, Any], tell: Tell) -> Any:
 
 
 def show_stroke(request: dict[str, Any], tell: Tell) -> Any:
-    """Return the page's guides that a `stroke` under way moves: numbers, and points (N, 16, 3)."""
+    """Return the page's guides that a `stroke` under way changes: numbers, points (N, 16, 3), and
+    packed colours (N, 16)."""
+    from hairkit.rendering.hair import packed_colours
+
     folder = Path(request["folder"])
     before = _page_hair(folder, _made(folder), json.dumps(read_edits(folder / EDITS).values()))
     hair = before.copy()
     brush_hair(hair, Edits.of([request["stroke"]], "stroke").strokes[0])
-    if len(hair.points) != len(before.points):  # strands that come and go need a whole preview
-        return {"guides": [], "points": []}
-    moved = np.flatnonzero((hair.points != before.points).any(axis=(1, 2)))
-    return {"guides": moved.tolist(), "points": np.round(hair.points[moved], 5).tolist()}
+    points, colours = hair.over(before)
+    changed = (points != before.points) | (colours != before.colours)
+    which = np.flatnonzero(changed.any(axis=(1, 2)))
+    return {
+        "guides": which.tolist(),
+        "points": np.round(points[which], 5).tolist(),
+        "tints": packed_colours(colours[which]).tolist(),
+    }
 
 
 @lru_cache(maxsize=1)

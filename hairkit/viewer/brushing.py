@@ -45,6 +45,11 @@ class Brushing:
         return edit_groom(self.before, Edits(tuple(self.strokes)))
 
     @property
+    def rows(self) -> Float64Array:
+        """The guides (G, m, 3) that are drawn, metres."""
+        return self.hair.points if self._lifted is None else self.hair.over(self._lifted)[0]
+
+    @property
     def told(self) -> str:
         """What the brush is, in words."""
         now, sides = self.setting, ", both sides" if self.setting.mirror else ""
@@ -60,7 +65,7 @@ class Brushing:
         self._way.append(place)
         if self.setting.brush == "comb":  # piece by piece it does what it does in one go
             brush_hair(self.hair, Edit(np.array(self._way[-2:]), self.setting))
-        elif len(self.hair.points) == len(self._lifted.points):  # else strands came or went
+        else:
             self.hair = self._lifted.copy()
             brush_hair(self.hair, Edit(np.array(self._way), self.setting))
         return True

@@ -271,8 +271,8 @@ class Session:
 
     def guide_rows(self) -> Float32Array:
         """Return the present guides (G, m, 3), head frame, metres."""
-        if self.brushing and len(self.brushing.hair.points) == len(self.body.guides):
-            return self.brushing.hair.points.astype(np.float32)
+        if self.brushing and len(shown := self.brushing.rows) == len(self.body.guides):
+            return shown.astype(np.float32)
         matrix = self.world_from_head.astype(np.float32)
         rows = self.simulation.simulator.points.reshape(-1, len(self._shares), 3)
         return np.asarray((rows - matrix[:3, 3]) @ matrix[:3, :3], np.float32)

@@ -338,21 +338,24 @@ def test_a_brush_is_led_by_keys(page: Any, story: Any) -> None:
     assert strokes_over_hair(story) == [stroke]
 
 
-@pytest.mark.parametrize("brush", ["puff", "cut", "curl"])
+@pytest.mark.parametrize("brush", ["puff", "cut", "curl", "thin", "dye"])
 def test_a_brush_shows_while_it_is_led(page: Any, story: Any, brush: str) -> None:
     """Other brushes than the comb show before they are lifted, too; dropped, nothing is left."""
     go(page, story, "hair")
     page.locator("#hair[data-skin]").wait_for()
     page.get_by_role("combobox", name="Brush").select_option(brush)
     tab_to(page, "Hair on a head")
-    before = page.evaluate("Array.from(document.querySelector('#hair').hairMotion.rest)")
+    of = "tints" if brush == "dye" else "rest"
+    changed = SHAPED.replace("rest", of)
+    before = page.evaluate(f"Array.from(document.querySelector('#hair').hairMotion.{of})")
+    assert page.get_by_label("Colour of the dye").is_visible() == (brush == "dye")
     kept = strokes_over_hair(story)
     page.keyboard.press("p")
     for _ in range(3):
         page.keyboard.press("ArrowDown")
-    page.wait_for_function(SHAPED, arg=[before, 0.002])
+    page.wait_for_function(changed, arg=[before, 0.002])
     page.keyboard.press("Escape")
-    page.wait_for_function(f"(given) => !({SHAPED})(given)", arg=[before, 1e-6])
+    page.wait_for_function(f"(given) => !({changed})(given)", arg=[before, 1e-6])
     assert strokes_over_hair(story) == kept
 
 

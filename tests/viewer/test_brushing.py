@@ -47,7 +47,8 @@ def test_a_stroke_is_that_of_the_functions(session: Session, name: str) -> None:
     after = session.opened.groom.strands
     np.testing.assert_allclose(after.points, wanted.strands.points, atol=2e-5)  # as it is kept
     assert np.abs(session.guide_rows() - shown).mean() < 2e-4  # of fewer points
-    changed = len(wanted.strands) != len(before.strands)
+    changed = len(wanted.strands) != len(before.strands) or after.colours is not None
+    assert changed == (name in ("add", "thin", "dye"))
     assert changed or np.abs(after.points - before.strands.points).max() > 1e-4
     session.advance(0.1)
     assert session.steps
@@ -65,6 +66,19 @@ def test_a_comb_shows_at_once_and_takes_hair_along(session: Session) -> None:
     assert (moved == 0).mean() > 0.3
     session.advance(0.5)
     assert session.steps == 0  # nothing moves under a brush
+
+
+def test_removed_strands_shrink_while_the_brush_is_down(session: Session) -> None:
+    """They are stubs on their roots until the brush is lifted; then they are gone."""
+    before, pixels = session.guide_rows(), over_the_top(session)
+    perform(session, "brush", {"name": "thin"})
+    for x, y in pixels:
+        perform(session, "stroke", {"x": x, "y": y})
+    shown = session.guide_rows()
+    stubs = np.linalg.norm(shown[:, -1] - shown[:, 0], axis=1) < 0.002
+    assert len(shown) == len(before)
+    perform(session, "lift")
+    assert len(session.guide_rows()) == len(before) - stubs.sum() < len(before)
 
 
 def test_undo_is_exact_and_survives(session: Session, swaying_manager: object) -> None:

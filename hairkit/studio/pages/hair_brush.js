@@ -19,12 +19,15 @@ export class HairBrush {
       type: "number", min: "0", max: "1", step: "any", placeholder: "usual",
       "aria-label": "Amount: metres, or a share",
     });
+    this.colour = make("input", {
+      type: "color", value: "#7a4a2a", "aria-label": "Colour of the dye",
+    });
     this.mirror = make("input", { type: "checkbox", "aria-label": "Both sides" });
     this.undo = make("button", { type: "button", onclick: () => this.back() }, "Undo");
     this.redo = make("button", { type: "button", onclick: () => this.forth() }, "Redo");
     this.settings = [ // of a brush: on a phone there is no room for them without one
       this.group, make("label", {}, "Size", this.size), make("label", {}, "Amount", this.amount),
-      make("label", {}, "Both sides", this.mirror),
+      make("label", {}, "Both sides", this.mirror), this.colour,
     ];
     for (const setting of this.settings) setting.hidden = true;
     this.controls = [this.choice, ...this.settings, this.undo, this.redo];
@@ -40,6 +43,7 @@ export class HairBrush {
   // Lets the studio read the hair before the first stroke, by one that reaches none.
   choose() {
     for (const setting of this.settings) setting.hidden = !this.name;
+    this.colour.hidden = this.name !== "dye";
     send("POST", "/api/edits/stroke", { stroke: { path: [[9, 9, 9]] } }).catch(() => {});
   }
 
@@ -71,10 +75,11 @@ export class HairBrush {
     this.more = Boolean(this.asked);
     if (this.asked) return;
     this.asked = this.stroke();
-    const { guides, points } = await send("POST", "/api/edits/stroke", { stroke: this.asked })
-      .catch(() => ({ guides: [], points: [] })); // the whole preview says what is wrong
+    const { guides, points, tints } = await send(
+      "POST", "/api/edits/stroke", { stroke: this.asked },
+    ).catch(() => ({ guides: [] })); // the whole preview says what is wrong
     this.asked = null;
-    if (this.path) motion.show(guides, points);
+    if (this.path) motion.show(guides, points, tints);
     if (this.path && this.more) this.preview(motion);
   }
 
@@ -83,12 +88,12 @@ export class HairBrush {
     const { name: brush, radius, path, amount: { value, validity } } = this;
     const [group, mirror] = [this.group.value, this.mirror.checked];
     const amount = value && validity.valid ? Number(value) : null;
-    return { brush, radius, mirror, group, path, amount };
+    return { brush, radius, mirror, group, path, amount, colour: this.colour.value };
   }
 
   drop(motion) {
     this.path = null;
-    motion.show([], []);
+    motion.show([]);
   }
 
   lift(motion) {

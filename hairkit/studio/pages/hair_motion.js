@@ -20,6 +20,7 @@ export class HairMotion {
     [this.count, this.points] = guides.shape;
     this.captured = guides.data;
     this.rest = Float32Array.from(guides.data); // brushes change it
+    this.tints = Uint32Array.from(packet.arrays.tint.data); // and these: packed colours
     this.now = Float32Array.from(guides.data);
     this.before = Float32Array.from(guides.data);
     this.stiff = packet.arrays.stiff.data; // 1 for brows, lashes and beard: they stay
@@ -30,7 +31,7 @@ export class HairMotion {
     this.time = 0;
     this.left = 0;
     this.held = null; // {guide, point, at: [x, y, z]}
-    this.shown = new Map(); // shapes of guides before the stroke under way
+    this.shown = new Map(); // shapes and tints of guides before the stroke
     this.lengths = new Float32Array(this.count * this.points);
     for (let g = 0; g < this.count; g += 1) {
       for (let p = 1; p < this.points; p += 1) {
@@ -41,19 +42,22 @@ export class HairMotion {
     }
   }
 
-  // Gives guides the shapes that a stroke under way makes of them; others go back to theirs.
-  show(guides, points) {
-    for (const [g, shape] of this.shown) this.shape(g, shape);
+  // Gives guides the shapes and tints that a stroke under way makes of them; others go back.
+  show(guides, points, tints) {
+    const { points: size } = this;
+    for (const [g, [shape, tint]] of this.shown) this.shape(g, shape, tint);
     guides.forEach((g, k) => {
-      const size = 3 * this.points;
-      if (!this.shown.has(g)) this.shown.set(g, this.rest.slice(g * size, (g + 1) * size));
-      this.shape(g, points[k].flat());
+      const [from, to] = [g * size, (g + 1) * size];
+      if (!this.shown.has(g))
+        this.shown.set(g, [this.rest.slice(3 * from, 3 * to), this.tints.slice(from, to)]);
+      this.shape(g, points[k].flat(), tints[k]);
     });
   }
 
-  // Sets the shape at rest of a guide, which goes along.
-  shape(g, places) {
+  // Sets the shape at rest of a guide, which goes along, and its tint.
+  shape(g, places, tint) {
     const { rest, now, before, lengths, points } = this;
+    this.tints.set(tint, g * points);
     for (let p = 0; p < points; p += 1) {
       const i = (g * points + p) * 3;
       for (let k = 0; k < 3; k += 1) {

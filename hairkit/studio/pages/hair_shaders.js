@@ -10,7 +10,7 @@ const float u_perspective = 1.0;
 const vec3 u_forward = vec3(0.0);
 ${shading}
 uniform sampler2D u_hair;      // (points * columns, rows) rest positions
-uniform sampler2D u_moved;     // (points, guides) displacement of every guide's points; their packed colour
+uniform sampler2D u_moved;     // (points, guides) displacement of guides, and their packed colour
 uniform mat4 u_clip_from_head;
 uniform vec2 u_layout;         // points of a strand, strands in a row of u_hair
 uniform float u_width, u_taper, u_pixel;

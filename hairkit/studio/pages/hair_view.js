@@ -43,7 +43,6 @@ export class HairView {
     const width = this.points * COLUMNS, height = Math.ceil(this.hairs / COLUMNS);
     upload(gl, this.hair, width, height, fourWide(arrays.hair.data, width * height));
     this.shift = new Float32Array(4 * this.points * arrays.guides.shape[0]);
-    this.tint(arrays.tint.data, 0);
     this.hairArray = vertexArray(gl, this.hairProgram, {
       a_carriers: [arrays.carriers.data, 3, 1], a_weights: [arrays.weights.data, 3, 1],
     });
@@ -145,15 +144,11 @@ export class HairView {
     }
   }
 
-  // Takes packed colours of points of the guides, from one of them on.
-  tint(packed, first) {
+  // Sends how far every point of the guides has moved, and its colour.
+  uploadMotion({ now, captured, tints }) {
     const bits = new Uint32Array(this.shift.buffer);
-    packed.forEach((value, k) => { bits[4 * (first + k) + 3] = value; });
-  }
-
-  // Sends how far every point of the guides has moved.
-  uploadMotion({ now, captured }) {
     for (let i = 0, j = 0; i < now.length; i += 3, j += 4) {
+      bits[j + 3] = tints[i / 3];
       for (let k = 0; k < 3; k += 1) this.shift[j + k] = now[i + k] - captured[i + k];
     }
     const guides = this.packet.arrays.guides.shape[0];
