@@ -17,6 +17,7 @@ Make a groom of tracked or imported strands, thin it out or fill it up, and prep
 * `head_collision`: strand points pushed out of the head
 * `lead_to_ties`: strands led to their tie and down the tail
 * `locks`: how hair lies in locks, and strays from them
+* `photo_colours`: colours of hair from the photos, of dyed streaks and tips too
 * `postprocess`: ties, waves and head collision after tracking
 * `prepare_export`: choice of strands and defaults for exporters
 * `target_rules`: what engines demand of a hair file

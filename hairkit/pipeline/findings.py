@@ -352,7 +352,7 @@ class Findings:
         return assemble_groom(
             self.capture.views, evidence.masks, replace(self.grown_head, maps=skin.result()),
             self.roots.value, group_seen(strands, evidence), evidence.waves, evidence.tied,
-            self.capture.chosen.hair,
+            self.capture.chosen.hair, evidence.scene.cameras,
         )  # fmt: skip
 
     def _solve(

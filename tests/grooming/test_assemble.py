@@ -10,7 +10,8 @@ import pytest
 
 from hairkit.colour import linear_from_srgb, srgb_from_linear
 from hairkit.errors import InputError
-from hairkit.grooming.assemble import DEPTH, LIGHT, TIP_SHADE, assemble_groom, measure_colour
+from hairkit.grooming.assemble import assemble_groom
+from hairkit.grooming.photo_colours import DEPTH, LIGHT, TIP_SHADE, measure_colour
 from hairkit.testing import ball_head, ball_mask, scalp_roots, striped_view, turn_scene
 from hairkit.types.capture import View
 from hairkit.types.head import Roots
