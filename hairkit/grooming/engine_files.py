@@ -32,7 +32,7 @@ ENGINES = {
         _HEAD,
     ),
     "houdini": (_hair({"hairs": 20_000}), _HEAD),
-    "hairworks": (EngineFile("hair.apx", "hairworks"),),
+    "hairworks": (EngineFile("hair.apx", "hairworks", {"maps": True}),),
     "web": (EngineFile("hair.glb", "gltf"),),
 }
 """The files of each engine; the first is the hair, which `hairkit validate --for` checks."""

@@ -8,6 +8,7 @@ of a groom read back), groups, widths along the strand, and points beyond `point
 * `asset`: the content of an .apx file
 * `from_groom`: groom to asset
 * `kept`: values of the file that a groom was read from
+* `maps`: density and colours over the scalp
 * `reader`: strict reader of .apx files
 * `schema`: classes, fields and defaults of HairWorks 1.1
 * `space`: unit, axes and handedness
@@ -28,7 +29,7 @@ from hairkit.grooming.prepare_export import ExportOptions, prepare_export
 from hairkit.hookspecs import hookimpl
 from hairkit.io.file_format import Feature, FileFormat
 from hairkit.options import option
-from hairkit.storage import read_bytes, write_text
+from hairkit.storage import read_bytes, write_bytes, write_text
 from hairkit.types.carried import Carried
 from hairkit.types.groom import Groom
 
@@ -36,7 +37,9 @@ from .asset import ApxAsset
 from .from_groom import Layout, groom_to_asset
 from .kept import FORMAT as CARRIED
 from .kept import asset_carried_by, with_kept_values
+from .maps import scalp_maps
 from .reader import MAX_BYTES, read_apx
+from .schema import TEXTURES
 from .space import CENTIMETRES, RIGHT_HANDED, UP_AXIS
 from .to_groom import asset_to_groom
 from .writer import asset_text
@@ -60,6 +63,7 @@ FORMAT = FileFormat(
         Feature.HEAD: "growth mesh of the roots",
         Feature.CURL: "as waves, where points are too far apart to show it",
     },
+    written={Feature.DENSITY, Feature.COLOURS},  # with `maps`
 )
 
 
@@ -100,6 +104,9 @@ class Options:
         doc="Hairs that HairWorks is to draw in all; 0: by the density of the .apx that was read,"
         " else 100,000.",
     )
+    maps: bool = option(
+        False, doc="Write maps of density, root and tip colours beside the file, where they vary."
+    )
     author: str = option("", doc="Author's name in the file.")
     head: Path | None = option(
         None, doc="Head to bind the guides to when a file is read; else its own growth mesh."
@@ -108,18 +115,29 @@ class Options:
 
 @hookimpl
 def export_groom(groom: Groom, path: Path, options: Options) -> bool:
-    """Write the groom's guides as .apx."""
-    write_text(path, asset_text(exported_asset(groom, options)))
+    """Write the groom's guides as .apx, and maps beside it where options say so."""
+    asset = exported_asset(groom, options)
+    maps = scalp_maps(_chosen(groom, options)) if options.maps else {}
+    files = {name: f"{path.stem}_{name.removesuffix('Texture')}.tga" for name in maps}
+    names = zip(TEXTURES, asset.textures, strict=True)
+    text = asset_text(replace(asset, textures=tuple(files.get(name, kept) for name, kept in names)))
+    for name, file in files.items():
+        write_bytes(path.with_name(file), maps[name])
+    write_text(path, text)
     return True
 
 
 def exported_asset(groom: Groom, options: Options) -> ApxAsset:
     """Return what is written of a groom; one that was read from an .apx keeps what it can."""
-    chosen = prepare_export(groom, ExportOptions(strands=options.strands)).groom
+    chosen = _chosen(groom, options)
     kept = asset_carried_by(groom)
     layout = _layout(options, kept)
     asset = groom_to_asset(chosen, layout)
     return asset if kept is None else with_kept_values(asset, chosen, kept, layout)
+
+
+def _chosen(groom: Groom, options: Options) -> Groom:
+    return prepare_export(groom, ExportOptions(strands=options.strands)).groom
 
 
 def _layout(options: Options, kept: ApxAsset | None) -> Layout:
