@@ -44,6 +44,8 @@ class GroomArrays:
     """(3,) linear RGB."""
     tip_colour: np.ndarray
     """(3,) linear RGB."""
+    colours: np.ndarray | None
+    """(P, 3) linear RGB, where points have colours of their own."""
 
 
 def read_groom(path):
@@ -98,4 +100,5 @@ def _arranged(stored):
         scalp=stored["head.scalp"],
         root_colour=stored["material.root_colour"],
         tip_colour=stored["material.tip_colour"],
+        colours=stored.get("colours"),
     )

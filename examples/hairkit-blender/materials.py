@@ -10,34 +10,46 @@ by eye, so that dark hair looks as in hairkit's own picture."""
 HEAD_COLOUR = (0.45, 0.27, 0.2, 1.0)
 
 
+COLOUR = "colour"
+"""Attribute of points with a colour of their own."""
+
+
 def hair_material(root_colour, tip_colour):
-    """Return a hair material (Chiang et al. 2016) whose colour runs from root to tip."""
+    """Return a hair material (Chiang et al. 2016) in the points' own colour, or from root to tip."""
     material = bpy.data.materials.new("hair")
     material.use_nodes = True
     tree = material.node_tree
     tree.nodes.clear()
     info = tree.nodes.new("ShaderNodeHairInfo")
-    mix = tree.nodes.new("ShaderNodeMix")
+    mix, own = (tree.nodes.new("ShaderNodeMix") for _ in range(2))
+    given = tree.nodes.new("ShaderNodeAttribute")
+    given.attribute_name = COLOUR
     gamma = tree.nodes.new("ShaderNodeGamma")
     fibre = tree.nodes.new("ShaderNodeBsdfHairPrincipled")
     output = tree.nodes.new("ShaderNodeOutputMaterial")
-    for index, node in enumerate((info, mix, gamma, fibre, output)):
+    for index, node in enumerate((info, mix, given, own, gamma, fibre, output)):
         node.location.x = 250 * index
-    mix.data_type = "RGBA"
-    ends = [socket for socket in mix.inputs if socket.type == "RGBA" and socket.enabled]
-    for socket, colour in zip(ends, (root_colour, tip_colour), strict=True):
+    for socket, colour in zip(_of(mix, "inputs"), (root_colour, tip_colour), strict=True):
         socket.default_value = (*map(float, colour), 1.0)
     fibre.parametrization = "COLOR"
     fibre.inputs["Roughness"].default_value = ROUGHNESS
-    share = next(socket for socket in mix.inputs if socket.enabled and socket.type == "VALUE")
-    mixed = next(socket for socket in mix.outputs if socket.enabled and socket.type == "RGBA")
-    tree.links.new(info.outputs["Intercept"], share)
     gamma.inputs["Gamma"].default_value = DARKENING
-    tree.links.new(mixed, gamma.inputs["Color"])
+    ramp, other = _of(own, "inputs")
+    tree.links.new(info.outputs["Intercept"], _of(mix, "inputs", "VALUE")[0])
+    tree.links.new(_of(mix, "outputs")[0], ramp)
+    tree.links.new(given.outputs["Color"], other)
+    tree.links.new(given.outputs["Alpha"], _of(own, "inputs", "VALUE")[0])  # 0 without colours
+    tree.links.new(_of(own, "outputs")[0], gamma.inputs["Color"])
     tree.links.new(gamma.outputs["Color"], fibre.inputs["Color"])
     tree.links.new(fibre.outputs[0], output.inputs["Surface"])
     material.diffuse_color = (*map(float, root_colour), 1.0)  # of the solid view
     return material
+
+
+def _of(mix, side, kind="RGBA"):
+    """Return the sockets of a mix of colours that are in use."""
+    mix.data_type = "RGBA"
+    return [socket for socket in getattr(mix, side) if socket.enabled and socket.type == kind]
 
 
 def head_material():

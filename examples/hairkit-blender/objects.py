@@ -7,7 +7,7 @@ import numpy as np
 
 from . import interpolation
 from .attachment import face_cells, places
-from .materials import hair_material, head_material
+from .materials import COLOUR, hair_material, head_material
 
 UV, ATTACHMENT = "UVMap", "hairkit attachment"
 SCALP = "scalp"
@@ -66,6 +66,9 @@ def add_hair(context, groom, name, head):
     for key, kind in (("group", "INT"), ("guide", "BOOLEAN")):
         if key in groom.strand:
             _set(curves, key, kind, "CURVE", groom.strand[key])
+    if groom.colours is not None:
+        opaque = np.pad(groom.colours, ((0, 0), (0, 1)), constant_values=1)
+        _set(curves, COLOUR, "FLOAT_COLOR", "POINT", opaque)
     curves.materials.append(hair_material(groom.root_colour, groom.tip_colour))
     curves.surface = head
     curves.surface_uv_map = ATTACHMENT
@@ -78,7 +81,7 @@ def add_hair(context, groom, name, head):
 
 def _set(curves, name, kind, domain, values):
     attribute = curves.attributes.get(name) or curves.attributes.new(name, kind, domain)
-    key = "vector" if kind == "FLOAT2" else "value"
+    key = {"FLOAT2": "vector", "FLOAT_COLOR": "color"}.get(kind, "value")
     attribute.data.foreach_set(key, np.ascontiguousarray(values).ravel())
 
 

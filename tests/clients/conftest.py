@@ -15,7 +15,7 @@ from client_groom import wandering
 from rich_groom import rich_groom
 from three_session import CLIENTS
 
-from hairkit.grooming.guide_weights import follow
+from hairkit.simulation.posing import pose_frames
 from hairkit.types.groom import Groom
 from hairkit.types.point_cache import PointCache
 
@@ -87,4 +87,4 @@ def stored_cache(cache: PointCache, tmp_path_factory: pytest.TempPathFactory) ->
 @pytest.fixture(scope="session")
 def frames(groom: Groom, cache: PointCache) -> npt.NDArray[np.float32]:
     """(3, P, 3) where all strands are at frames 0, 1 and 2, in Blender's axes."""
-    return z_up(follow(groom.strands, cache.points))
+    return z_up(pose_frames(groom, groom.strands, cache))

@@ -36,10 +36,13 @@ def test_hair_arrives_point_by_point(addon: BlenderSession, stored: Path, groom:
 
 
 def test_hair_is_in_the_captured_colour(addon: BlenderSession, stored: Path, groom: Groom) -> None:
-    """The material's two colours are those of root and tip."""
+    """The material's two colours are those of root and tip; points have their own."""
     hair = only(addon.call("addon.imported", path=stored), "CURVES")
     wanted = [groom.material.root_colour, groom.material.tip_colour]
     np.testing.assert_allclose(hair["ends"][0], wanted, atol=1e-6)
+    own = groom.strands.colours
+    np.testing.assert_allclose(hair["attributes"]["colour"][:, :3], own, atol=1e-6)
+    assert (hair["attributes"]["colour"][:, 3] == 1).all()
 
 
 def test_the_head_comes_along(addon: BlenderSession, stored: Path, groom: Groom) -> None:

@@ -223,7 +223,7 @@ def _with_looks(found: list) -> list:
 
 
 def _mixed(material: Any) -> list:
-    nodes = [node for node in material.node_tree.nodes if node.type == "MIX"]
+    nodes = [node for node in material.node_tree.nodes if node.type == "MIX"][:1]  # root to tip
     return [
         list(socket.default_value)[:3]
         for node in nodes
