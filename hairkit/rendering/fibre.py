@@ -32,7 +32,7 @@ OTHER = np.float32(61.8034)
 """The fractional part of this times a strand's random number is another one."""
 LEAST_POWER, POWERS = np.float32(0.85), np.float32(0.3)
 """Least exponent of a strand's colour, and its range from hair to hair."""
-LEAST_BRIGHT, BRIGHTS = np.float32(0.5), np.float32(1.0)
+LEAST_BRIGHT, BRIGHTS = np.float32(0.3), np.float32(1.4)
 """Least factor of a strand's colour, and its range."""
 DIRECTION_BASE = np.float32(0.2)
 """Least value of the colours that show directions, and range of their brightness."""

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import uniform_filter
+from scipy.ndimage import gaussian_filter, uniform_filter
 
 from hairkit.arrays import Float32Array
 from hairkit.types.camera import Camera
@@ -23,6 +23,8 @@ from hairkit.types.volume import VoxelGrid
 
 CELL = 0.005
 """Edge of a cell of the light volume, metres."""
+MARGIN = 5
+"""Cells around hair and meshes, so that at its border the volume has all of the light."""
 MAX_EDGE = 128
 """Cells along the longest side at most; hair that is longer gets larger cells."""
 FULL_HEAD = 100_000
@@ -35,6 +37,10 @@ STEPS = 28
 """Samples along the ray to a light."""
 STEP_GROWTH, FIRST_STEP = 1.08, 0.9
 """Ratio of successive steps along that ray, and the first sample in cells."""
+SOFTNESS = 0.008
+"""Sigma of the Gaussian that smooths transmittance, metres: lamps are wide, and light that hair
+scatters goes sideways too. Contrast at 3 px over the photos' is 1.29 on `straight_long` and 0.78 on
+`curls`; 1.43 and 0.82 with half of it, 1.12 and 0.72 with twice as much."""
 SOLID = 250.0
 """Optical depth of meshes, per metre."""
 KEY_DIRECTION, RIM_DIRECTION = (-0.45, -0.6, -0.75), (0.55, -0.6, 0.55)
@@ -112,8 +118,8 @@ class LightVolume:
 def hair_density(strands: Strands, solids: Sequence[Surface], cell: float = CELL) -> Density:
     """Return the extinction of hair and meshes on a grid around them, its cells `cell` metres."""
     points = [strands.points, *[solid.vertices for solid in solids]]
-    low = np.min([p.min(axis=0) for p in points if len(p)], axis=0) - 3 * cell
-    high = np.max([p.max(axis=0) for p in points if len(p)], axis=0) + 3 * cell
+    low = np.min([p.min(axis=0) for p in points if len(p)], axis=0) - MARGIN * cell
+    high = np.max([p.max(axis=0) for p in points if len(p)], axis=0) + MARGIN * cell
     grid = VoxelGrid.around(low, high, max(cell, float((high - low).max()) / MAX_EDGE))
     extinction = _hair_extinction(grid, strands)
     under = np.zeros(grid.shape, np.float32)
@@ -126,14 +132,13 @@ def hair_density(strands: Strands, solids: Sequence[Surface], cell: float = CELL
 def light_volume(density: Density, lights: Lights) -> LightVolume:
     """Return the transmittance of the lights through `density`."""
     grid, extinction = density.grid, density.extinction
-    transmittance = np.ones((*grid.shape, 3), np.float32)
-    inside = uniform_filter(extinction, 3, mode="constant") > 0
+    transmittance = np.empty((*grid.shape, 3), np.float32)
     for channel, direction in enumerate((lights.key_direction, lights.rim_direction)):
         depth = _optical_depth_towards(extinction, grid.spacing, np.array(direction))
-        transmittance[inside, channel] = np.exp(-depth[inside])
-    transmittance[..., :2] = uniform_filter(transmittance[..., :2], (3, 3, 3, 1))
+        transmittance[..., channel] = np.exp(-depth)
     transmittance[..., 2] = _sky_visibility(extinction, grid.spacing)
-    return LightVolume(grid, transmittance)
+    sigma = SOFTNESS / grid.spacing
+    return LightVolume(grid, gaussian_filter(transmittance, sigma, axes=(0, 1, 2)))
 
 
 def _hair_extinction(grid: VoxelGrid, strands: Strands) -> Float32Array:
