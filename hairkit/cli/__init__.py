@@ -1,10 +1,11 @@
-"""The command line: one verb, one small file `hairkit/cli/VERB.py` with `register` and `run`.
+"""The command line: one verb, one small file `hairkit/cli/VERB.py`.
 
-`register(subparsers)` adds the verb's parser, its description beginning with an example;
-`run(args)` does the work and returns the exit code. Only the verb that is asked for is imported.
+Its `DESCRIPTION` begins with an example, `add_arguments(add)` adds to its parser, and `run(args)`
+does the work and returns the exit code. Only the verb that is asked for is imported.
 Results go to stdout, progress and logs to stderr. Exit codes: 0 done, 1 a bug, 2 one line says why,
 3 a simulation diverged, 4 a file that was validated breaks a rule, 130 ended by a second Ctrl-C.
 
+* `arguments`: arguments that several verbs have
 * `batch`: many captures
 * `batch_table`: its table on a terminal
 * `convert`: read hair of one format, write another
@@ -200,7 +201,8 @@ def _build(verb: str | None) -> tuple[Parser, Parser | None, Any]:
     for name, summary in VERBS.items():
         if name == verb:
             module = importlib.import_module(f"hairkit.cli.{name.replace('-', '_')}")
-            module.register(verbs)
+            parts = verbs.add_parser(name, help=summary, description=module.DESCRIPTION)
+            module.add_arguments(parts.add_argument)
         else:
             verbs.add_parser(name, help=summary)
     return parser, verbs.choices[verb] if verb is not None else None, module

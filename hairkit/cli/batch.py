@@ -12,13 +12,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hairkit.cli.settings import STAGE_HELP, add_setting
+from hairkit.cli.arguments import Add, add_shared, add_stage_settings
 from hairkit.errors import InputError
 
 if TYPE_CHECKING:
     from hairkit.batches.jobs import Result, Settings
 
-_DESCRIPTION = """\
+DESCRIPTION = """\
 Example: hairkit batch captures/ -o results/
 
 Reconstruct every capture in a folder: a folder of photos, or a video, for each. CAPTURES may be a
@@ -27,28 +27,19 @@ as `hairkit reconstruct` writes it, and report.html and report.json about all. C
 processes of their own, as many at once as there are cores and memory for. One that fails, hangs or
 crashes fails alone. Run it again: it does what is missing. Exit code 2 where one failed.
 """
-GUIDES = 600
-"""Roots by default, as of `hairkit.reconstruct`."""
 TIME_LIMIT_S = 3600.0
 """Seconds that a capture may take by default, as of `hairkit.batch`."""
 REBUILDS = 3
 """Schedulers of its own that are started, one after the other, where they are lost."""
 
 
-def register(subparsers: Any) -> None:
-    """Add the verb to the command line."""
-    parser = subparsers.add_parser(
-        "batch", help="reconstruct many captures", description=_DESCRIPTION
-    )
-    add = parser.add_argument
+def add_arguments(add: Add) -> None:
+    """Add the arguments."""
     add("captures", metavar="CAPTURES", help="folder of folders or videos, or its URL, or a .txt")
     add("-o", "--out", required=True, metavar="OUT", help="output folder, or its URL")
-    add("--recipe", default="default", metavar="R", help="a shipped recipe or a .toml file")
-    add_setting(add, STAGE_HELP)
-    add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
-    add("--guides", type=int, default=GUIDES, metavar="N", help=f"guide hairs (default {GUIDES})")
-    add("--seed", type=int, default=0, metavar="N", help="seed of the root positions (default 0)")
-    add("--max-edge", type=int, metavar="PX", help="scale larger photos to this edge (1440)")
+    add_stage_settings(add)
+    add_shared(add, "--plugin")
+    add_shared(add, "--guides", "--seed", "--max-edge")
     add("--sheet", action="store_true", help="draw the contact sheets")
     add("--scores", action="store_true", help="score captures that have a folder truth/")
     add("--drop-work", action="store_true", help="empty work/ of captures that are done")
@@ -65,8 +56,7 @@ def register(subparsers: Any) -> None:
     add("--write-job", choices=["openjd", "shell"], help="write a job file for a farm, run nothing")
     add("--report", action="store_true", help="only write the report about what is there")
     add("--no-report", action="store_true", help="write no report: others do other parts")
-    add("--quiet", action="store_true", help="print only errors on stderr")
-    add("--json", action="store_true", help="print the report as JSON")
+    add_shared(add, "--quiet", "--json")
 
 
 def run(args: argparse.Namespace) -> int:

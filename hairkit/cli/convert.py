@@ -6,13 +6,13 @@ import argparse
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
+from hairkit.cli.arguments import Add, add_shared
 from hairkit.cli.reader_settings import add_reader_arguments, reader_settings
-from hairkit.cli.settings import add_setting, split_settings
-from hairkit.cli.written import add_json, check_target, print_written
+from hairkit.cli.settings import split_settings
+from hairkit.cli.written import check_target, print_written
 from hairkit.errors import InputError
 from hairkit.grooming.decimate import decimate
 from hairkit.grooming.guide_weights import guide_mask
@@ -20,7 +20,7 @@ from hairkit.manager import Manager
 from hairkit.pipeline.open_groom import load_groom, plugin_for
 from hairkit.types.groom import Groom
 
-_DESCRIPTION = """\
+DESCRIPTION = """\
 Example: hairkit convert a.tfx b.abc --scale 0.0023 --up y
 
 Read a file of one format and write it in another; suffixes choose the formats. What the input lacks
@@ -31,30 +31,17 @@ CURLS = 400
 """Strands at most whose curl is measured."""
 
 
-def register(subparsers: Any) -> None:
-    """Add the verb to the command line."""
-    parser = subparsers.add_parser(
-        "convert", help="read hair of one format, write another", description=_DESCRIPTION
-    )
-    add = parser.add_argument
+def add_arguments(add: Add) -> None:
+    """Add the arguments."""
     add("source", metavar="IN", type=Path, help="file of any format that a plugin imports")
     add("target", metavar="OUT", type=Path, help="file of any format that a plugin exports")
-    add_reader_arguments(parser)
-    add(
-        "--guides",
-        type=int,
-        metavar="N",
-        help="mark N strands of full hair as its guides; with --set writer.strands=guides write"
-        " these only",
-    )
-    add(
-        "--measure-curl",
-        action="store_true",
-        help="measure the strands' waves or coils for the material (HairWorks draws them)",
-    )
+    add_reader_arguments(add)
+    guides = "mark N strands of full hair as its guides; with --set writer.strands=guides write"
+    add("--guides", type=int, metavar="N", help=f"{guides} these only")
+    curl = "measure the strands' waves or coils for the material (HairWorks draws them)"
+    add("--measure-curl", action="store_true", help=curl)
     add("--to", metavar="PLUGIN", help="export plugin (default: by suffix)")
-    add_setting(add)
-    add_json(add)
+    add_shared(add, "--set", "--json")
 
 
 def run(args: argparse.Namespace) -> int:

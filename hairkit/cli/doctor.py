@@ -16,8 +16,9 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import Any, Literal
+from typing import Literal
 
+from hairkit.cli.arguments import Add, add_shared
 from hairkit.manager import Manager
 from hairkit.manager.guard import describe_error
 from hairkit.nets.install import is_intact
@@ -26,7 +27,7 @@ from hairkit.nets.model_folder import model_folder
 from hairkit.system import gl_cure
 from hairkit.version import __version__
 
-_DESCRIPTION = """\
+DESCRIPTION = """\
 Example: hairkit doctor
 
 Check Python, the packages, OpenGL, caches and plugins, and say what to install. The exit code is
@@ -60,10 +61,9 @@ class Finding:
     text: str
 
 
-def register(subparsers: Any) -> None:
-    """Add the verb to the command line."""
-    parser = subparsers.add_parser("doctor", help="check this machine", description=_DESCRIPTION)
-    parser.add_argument("--json", action="store_true", help="print JSON")
+def add_arguments(add: Add) -> None:
+    """Add the arguments."""
+    add_shared(add, "--json")
 
 
 def run(args: argparse.Namespace) -> int:

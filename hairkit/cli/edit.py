@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from hairkit.cli.settings import add_setting, importer_of, split_settings
-from hairkit.cli.written import add_json, check_target, print_written
+from hairkit.cli.arguments import Add, add_shared
+from hairkit.cli.settings import importer_of, split_settings
+from hairkit.cli.written import check_target, print_written
 from hairkit.errors import InputError
 from hairkit.manager import Manager
 from hairkit.options import describe, make_options
 from hairkit.pipeline.open_groom import load_groom, plugin_for
 from hairkit.types.edits import Brush, Edit, Edits, read_edits
 
-_DESCRIPTION = """\
+DESCRIPTION = """\
 Example: hairkit edit groom.npz --brush trim --amount 0.03 -o short.npz
 
 Brush all hair of a groom, or do the strokes of an edits.json, or both: strokes first. Brushes and
@@ -26,18 +26,14 @@ _OPTIONS = [info for info in describe(Brush) if info.name not in ("radius", "mir
 """All but those of strokes along a path."""
 
 
-def register(subparsers: Any) -> None:
-    """Add the verb to the command line."""
-    parser = subparsers.add_parser("edit", help="brush a groom", description=_DESCRIPTION)
-    add = parser.add_argument
+def add_arguments(add: Add) -> None:
+    """Add the arguments."""
     add("groom", metavar="GROOM", type=Path, help="groom.npz, or a file that a plugin reads")
     for info in _OPTIONS:
         add(f"--{info.name}", metavar="V", help=f"{info.doc} ({info.wanted})")
     add("--strokes", type=Path, metavar="FILE", help="do the strokes of an edits.json")
     add("-o", "--out", type=Path, required=True, metavar="FILE", help="file to write")
-    add_setting(add)
-    add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
-    add_json(add)
+    add_shared(add, "--set", "--plugin", "--json")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -5,14 +5,16 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from hairkit.cli.arguments import Add, add_shared
 
 if TYPE_CHECKING:
     from rich.table import Table
 
     from hairkit.evaluation import Evaluation
 
-_DESCRIPTION = """\
+DESCRIPTION = """\
 Example: hairkit evaluate out/ --truth captures/wavy/truth
 
 Score a groom against the truth of its capture: precision, recall and F of the strands, lengths,
@@ -24,25 +26,14 @@ _PLAIN_WIDTH = 100
 """Columns of a table that goes to a file or a pipe."""
 
 
-def register(subparsers: Any) -> None:
-    """Add the verb to the command line."""
-    parser = subparsers.add_parser(
-        "evaluate", help="score a groom against the truth", description=_DESCRIPTION
-    )
-    parser.add_argument("groom", type=Path, metavar="OUT", help="folder of reconstruct, or a groom")
-    parser.add_argument(
-        "--truth", type=Path, required=True, metavar="DIR", help="the capture's truth folder"
-    )
-    parser.add_argument(
-        "-o", dest="report", type=Path, metavar="DIR", help="report folder (OUT/evaluation)"
-    )
-    parser.add_argument(
-        "--scene", type=Path, metavar="FILE", help="cameras of the groom (scene.json beside it)"
-    )
-    parser.add_argument(
-        "--consistency", action="store_true", help="measure strand consistency too (slower)"
-    )
-    parser.add_argument("--json", action="store_true", help="print JSON")
+def add_arguments(add: Add) -> None:
+    """Add the arguments."""
+    add("groom", type=Path, metavar="OUT", help="folder of reconstruct, or a groom")
+    add("--truth", type=Path, required=True, metavar="DIR", help="the capture's truth folder")
+    add("-o", dest="report", type=Path, metavar="DIR", help="report folder (OUT/evaluation)")
+    add("--scene", type=Path, metavar="FILE", help="cameras of the groom (scene.json beside it)")
+    add("--consistency", action="store_true", help="measure strand consistency too (slower)")
+    add_shared(add, "--json")
 
 
 def run(args: argparse.Namespace) -> int:

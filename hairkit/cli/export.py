@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
 from hairkit.api import export_for
-from hairkit.cli.settings import add_setting, importer_of, split_settings
-from hairkit.cli.written import add_json, check_target, print_written
+from hairkit.cli.arguments import Add, add_shared
+from hairkit.cli.settings import importer_of, split_settings
+from hairkit.cli.written import check_target, print_written
 from hairkit.errors import InputError
 from hairkit.grooming.engine_files import ENGINES
 from hairkit.manager import Manager
 from hairkit.pipeline.open_groom import load_groom, plugin_for
 
-_DESCRIPTION = """\
+DESCRIPTION = """\
 Example: hairkit export out/groom.npz -o hair.apx
 
 Write a groom in the format of the file's suffix, or with --for all files that an engine takes, as
@@ -23,25 +23,18 @@ plugins --formats` lists what each format carries; `hairkit convert` has more op
 file."""
 
 
-def register(subparsers: Any) -> None:
-    """Add the verb to the command line."""
-    parser = subparsers.add_parser(
-        "export", help="write a groom in an engine's format", description=_DESCRIPTION
-    )
-    add = parser.add_argument
-    add("groom", metavar="GROOM", help="groom.npz, or a file that an import plugin reads")
+def add_arguments(add: Add) -> None:
+    """Add the arguments."""
+    add("groom", metavar="GROOM", type=Path, help="groom.npz, or a file that a plugin reads")
     add("-o", "--out", required=True, metavar="FILE", help="file to write, with --for a folder")
     add("--for", dest="engine", choices=tuple(ENGINES), help=f"engine: {', '.join(ENGINES)}")
-    add_setting(add)
-    add("--using", metavar="NAME", help="export plugin (default: by suffix)")
-    add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
-    add_json(add)
+    add_shared(add, "--set", "--using", "--plugin", "--json")
 
 
 def run(args: argparse.Namespace) -> int:
     """Export, and print the file's name."""
     manager = Manager.loaded(args.plugin)
-    source, target = Path(args.groom), Path(args.out)
+    source, target = args.groom, Path(args.out)
     if args.engine is not None:
         return _run_for_engine(args, manager)
     exporter = args.using or plugin_for(manager, "export_groom", target)
@@ -60,11 +53,11 @@ def _run_for_engine(args: argparse.Namespace, manager: Manager) -> int:
     """Export all files of an engine, and print their names."""
     if args.using is not None:
         raise InputError(f"--for {args.engine} chooses the plugins; leave --using out")
-    reader = importer_of(manager, Path(args.groom))
+    reader = importer_of(manager, args.groom)
     settings = split_settings(manager, {"reader": reader}, args.set)["reader"]
     if Path(args.out).is_dir():
         for file in ENGINES[args.engine]:
-            check_target(Path(args.out, file.name), Path(args.groom))
-    groom = load_groom(manager, Path(args.groom), settings)
+            check_target(Path(args.out, file.name), args.groom)
+    groom = load_groom(manager, args.groom, settings)
     print_written(args, *export_for(groom, args.engine, args.out, manager=manager))
     return 0

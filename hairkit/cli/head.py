@@ -5,13 +5,12 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import Any
 
-from hairkit.cli.settings import STAGE_HELP, add_setting
-from hairkit.cli.written import add_json, check_target, print_written
+from hairkit.cli.arguments import Add, add_shared, add_stage_settings
+from hairkit.cli.written import check_target, print_written
 from hairkit.errors import InputError
 
-_DESCRIPTION = """\
+DESCRIPTION = """\
 Example: hairkit head photos/ -o head.glb
 
 Fit the head to photos and take its skin from them. PHOTOS is what hairkit reconstruct takes. The
@@ -19,17 +18,12 @@ ending says the format: .glb and .fbx (skeleton and texture inside), .obj (with 
 .npz."""
 
 
-def register(subparsers: Any) -> None:
-    """Add the verb to the command line."""
-    parser = subparsers.add_parser("head", help="photos to a head", description=_DESCRIPTION)
-    add = parser.add_argument
+def add_arguments(add: Add) -> None:
+    """Add the arguments."""
     add("photos", metavar="PHOTOS", help="folder of the photos, or a video")
     add("-o", "--output", type=Path, required=True, metavar="FILE", help="file of the head")
-    add("--recipe", default="default", metavar="R", help="recipe, of which the first stages run")
-    add_setting(add, STAGE_HELP)
-    add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
-    add("--quiet", action="store_true", help="print only errors on stderr")
-    add_json(add)
+    add_stage_settings(add)
+    add_shared(add, "--plugin", "--quiet", "--json")
 
 
 def run(args: argparse.Namespace) -> int:

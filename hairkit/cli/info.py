@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 
 from hairkit.arrays import Float32Array
+from hairkit.cli.arguments import Add, add_shared
 from hairkit.cli.reader_settings import add_reader_arguments, reader_settings
-from hairkit.cli.settings import add_setting, split_settings
+from hairkit.cli.settings import split_settings
 from hairkit.errors import FormatError, InputError, one_line
 from hairkit.types.groom import Groom
 from hairkit.types.point_cache import PointCache, is_cache_file
 
-_DESCRIPTION = """\
+DESCRIPTION = """\
 Example: hairkit info out/groom.npz
 
 Print what a file contains: a groom (.npz or what an import plugin reads; --scale, --up and --set
@@ -31,22 +32,14 @@ _HEADS = (".obj", ".ply", ".glb", _AVATAR)
 _CARDS = (".glb", ".gltf", ".vrm", ".obj")
 
 
-def register(subparsers: Any) -> None:
-    """Add the verb to the command line."""
-    parser = subparsers.add_parser(
-        "info", help="print what a file contains", description=_DESCRIPTION
-    )
-    parser.add_argument("file", metavar="FILE", help="a file, or a capture")
-    parser.add_argument("--recipe", metavar="R", help="FILE is a capture that this recipe takes")
-    parser.add_argument(
-        "--head-units", default="m", metavar="U", help="units of a head file (default m)"
-    )
-    parser.add_argument(
-        "--head-scalp", metavar="NAME", help="its scalp: a group, a mask picture, or transfer"
-    )
-    add_reader_arguments(parser)
-    add_setting(parser.add_argument)
-    parser.add_argument("--json", action="store_true", help="print JSON")
+def add_arguments(add: Add) -> None:
+    """Add the arguments."""
+    add("file", metavar="FILE", help="a file, or a capture")
+    add("--recipe", metavar="R", help="FILE is a capture that this recipe takes")
+    add("--head-units", default="m", metavar="U", help="units of a head file (default m)")
+    add("--head-scalp", metavar="NAME", help="its scalp: a group, a mask picture, or transfer")
+    add_reader_arguments(add)
+    add_shared(add, "--set", "--json")
 
 
 def run(args: argparse.Namespace) -> int:

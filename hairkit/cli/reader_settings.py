@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
+from hairkit.cli.arguments import Add, add_shared
 from hairkit.errors import OptionError
 
 if TYPE_CHECKING:
@@ -14,14 +15,13 @@ UP = {"y": "y_up_metres", "z": "z_up_metres"}
 """Axis option of the reader for each way up."""
 
 
-def add_reader_arguments(parser: argparse.ArgumentParser) -> None:
+def add_reader_arguments(add: Add) -> None:
     """Add options about the file to read."""
-    add = parser.add_argument
     add("--scale", metavar="M", help="metres per unit of the input file")
     add("--up", choices=tuple(UP), help="up axis of the input file")
     add("--head", metavar="FILE", help="head to put under the strands")
     add("--from", dest="reader", metavar="PLUGIN", help="import plugin (default: by suffix)")
-    add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
+    add_shared(add, "--plugin")
 
 
 def reader_settings(manager: Manager, reader: str, args: argparse.Namespace) -> dict[str, object]:

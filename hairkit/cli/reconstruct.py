@@ -10,14 +10,14 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
-from hairkit.cli.settings import STAGE_HELP, add_setting
+from hairkit.cli.arguments import Add, add_shared, add_stage_settings, check_range
 from hairkit.errors import InputError
 
 if TYPE_CHECKING:
     from hairkit.types.capture import Capture
     from hairkit.types.strands import Strands
 
-_DESCRIPTION = """\
+DESCRIPTION = """\
 Example: hairkit reconstruct photos/ -o out/
 
 Turn photos of a head into a groom. PHOTOS is a folder with up to 36 photos taken around the head,
@@ -27,50 +27,31 @@ edits.json, matched by name, and a capture.toml; or a video of one turn. OUT get
 scene.json, the recipe's exports, contact_sheet.png, run.json (what was done, and how good it is)
 and hairkit.log. After an interruption, run it again: it continues where it stopped.
 """
-GUIDES = 600
-"""Roots by default, as of `hairkit.reconstruct`."""
 SMALLEST_EDGE, LARGEST_EDGE = 128, 8192
 """Longer edges in pixels to which photos may be scaled."""
 
 
-def register(subparsers: Any) -> None:
-    """Add the verb to the command line."""
-    from hairkit.pipeline.recipe import recipe_names
+def add_arguments(add: Add) -> None:
+    """Add the arguments."""
     from hairkit.types.parting import PartingWord
 
-    parser = subparsers.add_parser(
-        "reconstruct",
-        help="turn photos of a head, or a video, into a groom",
-        description=_DESCRIPTION,
-    )
-    add = parser.add_argument
     add("photos", nargs="*", metavar="PHOTOS", help="a folder, photos, a video, or a name")
     add("-o", "--out", required=True, metavar="OUT", help="output folder")
     add("--sample", action="store_true", help="use the capture that ships with hairkit")
-    recipes = f"{', '.join(recipe_names())} or a .toml file"
-    add("--recipe", default="default", metavar="R", help=recipes)
-    add_setting(add, STAGE_HELP)
+    add_stage_settings(add)
     add("--head", metavar="FILE", help="your head: OBJ, PLY or GLB with a scalp")
     add("--head-units", default="m", metavar="U", help="units of the head file (default m)")
-    add(
-        "--head-scalp",
-        metavar="NAME",
-        help="the scalp: a group of it, a mask picture, or transfer: the default head's",
-    )
+    scalp = "the scalp: a group of it, a mask picture, or transfer: the default head's"
+    add("--head-scalp", metavar="NAME", help=scalp)
     add("--head-up", default="y", metavar="AXIS", help="axis that points up in it (default y)")
     words = get_args(PartingWord)
     add("--parting", choices=words, help="where the parting is (default: as the photos show it)")
-    guides = f"number of guide hairs (default {GUIDES})"
-    add("--guides", type=int, default=GUIDES, metavar="N", help=guides)
-    add("--seed", type=int, default=0, metavar="N", help="seed of the root positions (default 0)")
-    add("--max-edge", type=int, metavar="PX", help="scale larger photos to this edge (1440)")
-    add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
+    add_shared(add, "--guides", "--seed", "--max-edge")
+    add_shared(add, "--plugin")
     add("--no-cache", action="store_true", help="run every stage again")
     add("--drop-work", action="store_true", help="empty OUT/work/ at the end: most of the bytes")
     add("--no-sheet", action="store_true", help="draw no contact sheet")
-    add("--quiet", action="store_true", help="print only errors on stderr")
-    add("--steps", action="store_true", help="a line for each step, for programs that show them")
-    add("--json", action="store_true", help="print a summary as JSON")
+    add_shared(add, "--quiet", "--steps", "--json")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -87,7 +68,8 @@ def run(args: argparse.Namespace) -> int:
     began = time.perf_counter()
     manager = Manager.loaded(args.plugin)
     head = _head(args)
-    edge = _max_edge(args, WORKING_EDGE)
+    check_range("--max-edge", args.max_edge, SMALLEST_EDGE, LARGEST_EDGE, "pixels")
+    edge = args.max_edge or WORKING_EDGE
     capture, recipe = take_with_choices(_photos(args, edge), args.recipe, manager, args.set, edge)
     if args.parting is not None:
         capture = replace(capture, parting=Parting.named(args.parting))
@@ -143,16 +125,6 @@ def _photos(args: argparse.Namespace, edge: int) -> Capture | str:
     if len(args.photos) > 1:
         return read_files([Path(photo) for photo in args.photos], edge)
     return str(sample_folder()) if args.sample else str(args.photos[0])
-
-
-def _max_edge(args: argparse.Namespace, default: int) -> int:
-    if args.max_edge is None:
-        return default
-    if not SMALLEST_EDGE <= args.max_edge <= LARGEST_EDGE:
-        raise InputError(
-            f"--max-edge is {args.max_edge}, expected {SMALLEST_EDGE} to {LARGEST_EDGE} pixels"
-        )
-    return int(args.max_edge)
 
 
 def _head(args: argparse.Namespace) -> Any:

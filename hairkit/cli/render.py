@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from hairkit.cli.settings import add_setting, importer_of, split_settings
-from hairkit.cli.written import add_json, check_target, print_written
+from hairkit.cli.arguments import Add, add_shared, check_range
+from hairkit.cli.settings import importer_of, split_settings
+from hairkit.cli.written import check_target, print_written
 from hairkit.errors import InputError
 from hairkit.grooming.densify import densify
 from hairkit.grooming.guide_weights import guide_mask
@@ -30,7 +31,7 @@ from hairkit.types.scene import read_cameras
 from hairkit.types.skin_look import LOBES, SkinLook
 from hairkit.types.strands import Strands
 
-_DESCRIPTION = """\
+DESCRIPTION = """\
 Example: hairkit render out/groom.npz -o front-left.png --camera front-left
 
 Draw a groom on its head, its guides interpolated to full hair. The camera is a name of the turn,
@@ -46,39 +47,29 @@ LARGEST = 8192
 """Longest edge of a picture, pixels."""
 
 
-def register(subparsers: Any) -> None:
-    """Add the verb to the command line."""
-    parser = subparsers.add_parser("render", help="draw a groom", description=_DESCRIPTION)
-    parser.add_argument(
-        "groom", metavar="GROOM", type=Path, help="groom.npz, or a file that an import plugin reads"
-    )
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="FILE", help="PNG")
-    parser.add_argument(
-        "--camera", default=None, help="front, left, ... or azimuth,elevation (front)"
-    )
-    parser.add_argument("--scene", type=Path, metavar="FILE", help="scene.json with cameras")
-    parser.add_argument("--view", metavar="NAME", help="the view of the scene (its first)")
-    parser.add_argument("--hairs", type=int, default=HAIRS, metavar="N", help=f"strands ({HAIRS})")
-    parser.add_argument("--size", metavar="WxH", help="pixels (1280x720; the scene's own size)")
-    parser.add_argument("--turntable", type=int, metavar="N", help="N pictures all around")
-    parser.add_argument(
-        "--lobe", default=LOBES[0], choices=LOBES, help=f"of the oil on skin: {', '.join(LOBES)}"
-    )
-    parser.add_argument("--seed", type=int, default=0, help="of the interpolated hair (0)")
-    parser.add_argument("--cache", type=Path, metavar="FILE", help="simulation of the groom (.npz)")
-    parser.add_argument("--frame", type=int, metavar="N", help="its frame, -1 is the last (0)")
-    add_setting(parser.add_argument)
-    parser.add_argument(
-        "--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too"
-    )
-    add_json(parser.add_argument)
+def add_arguments(add: Add) -> None:
+    """Add the arguments."""
+    add("groom", metavar="GROOM", type=Path, help="groom.npz, or a file that a plugin reads")
+    add("-o", "--output", type=Path, required=True, metavar="FILE", help="PNG")
+    add("--camera", help="front, left, ... or azimuth,elevation (front)")
+    add("--scene", type=Path, metavar="FILE", help="scene.json with cameras")
+    add("--view", metavar="NAME", help="the view of the scene (its first)")
+    add("--hairs", type=int, default=HAIRS, metavar="N", help=f"strands ({HAIRS})")
+    add("--size", metavar="WxH", help="pixels (1280x720; the scene's own size)")
+    add("--turntable", type=int, metavar="N", help="N pictures all around")
+    lobes = f"of the oil on skin: {', '.join(LOBES)}"
+    add("--lobe", default=LOBES[0], choices=LOBES, help=lobes)
+    add("--seed", type=int, default=0, help="of the interpolated hair (0)")
+    add("--cache", type=Path, metavar="FILE", help="simulation of the groom (.npz)")
+    add("--frame", type=int, metavar="N", help="its frame, -1 is the last (0)")
+    add_shared(add, "--set", "--plugin", "--json")
 
 
 def run(args: argparse.Namespace) -> int:
     """Draw and print the names of the pictures."""
     check_target(args.output)
-    if not 1 <= args.hairs <= MOST_HAIRS:
-        raise InputError(f"--hairs is {args.hairs}, expected 1 to {MOST_HAIRS}")
+    check_range("--hairs", args.hairs, 1, MOST_HAIRS)
+    check_range("--turntable", args.turntable, 1, MOST_PICTURES, "pictures")
     groom, hair = _hair_and_head(args)
     cameras = _cameras(args, groom.head.vertices, hair)
     paths = _paths(args.output, len(cameras))
@@ -124,12 +115,8 @@ def _cameras(args: argparse.Namespace, head: Any, hair: Strands) -> list[Camera]
         raise InputError(f"--view {args.view} needs --scene scene.json")
     width, height = parse_size(args.size or "1280x720")
     azimuth, elevation = _direction(args.camera or "front")
-    if args.turntable is None:
-        turn = [azimuth]
-    elif 1 <= args.turntable <= MOST_PICTURES:
-        turn = (azimuth + 360 * np.arange(args.turntable) / args.turntable).tolist()
-    else:
-        raise InputError(f"--turntable is {args.turntable}, expected 1 to {MOST_PICTURES} pictures")
+    count = args.turntable or 1
+    turn = (azimuth + 360 * np.arange(count) / count).tolist()
     points = np.concatenate([head, hair.points])
     return framing_cameras(points, [(a, elevation) for a in turn], width, height)
 

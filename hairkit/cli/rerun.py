@@ -6,9 +6,10 @@ import argparse
 import json
 import sys
 from pathlib import Path
-from typing import Any
 
-_DESCRIPTION = """\
+from hairkit.cli.arguments import Add, add_shared
+
+DESCRIPTION = """\
 Example: hairkit rerun out/run.json -o again/
 
 Run a reconstruction again from the run.json beside its groom: the same photos, recipe, options,
@@ -17,17 +18,12 @@ came out the same; exit code 2 where one did not, on the same versions and input
 """
 
 
-def register(subparsers: Any) -> None:
-    """Add the verb to the command line."""
-    parser = subparsers.add_parser(
-        "rerun", help="run a reconstruction again from its record", description=_DESCRIPTION
-    )
-    add = parser.add_argument
+def add_arguments(add: Add) -> None:
+    """Add the arguments."""
     add("record", metavar="RUN.JSON", help="record that reconstruct wrote")
     add("-o", "--out", required=True, metavar="OUT", help="output folder")
     add("--force", action="store_true", help="take inputs that have changed as they are now")
-    add("--quiet", action="store_true", help="print only errors on stderr")
-    add("--json", action="store_true", help="print a summary as JSON")
+    add_shared(add, "--quiet", "--json")
 
 
 def run(args: argparse.Namespace) -> int:

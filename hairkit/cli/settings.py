@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from hairkit.errors import OptionError
 from hairkit.options import split_setting, unknown_name
@@ -12,17 +12,8 @@ from hairkit.options import split_setting, unknown_name
 if TYPE_CHECKING:
     from hairkit.manager import Manager
 
-SET_HELP = "set an option: plugin.option=V, or option=V where one plugin has it"
-STAGE_HELP = "set an option: plugin.option=V, or a stage's plugin: stage=PLUGIN"
-"""Of the verb that runs a recipe, where many plugins are used."""
-
 Settings = dict[str, dict[str, object]]
 """Values by option, by role."""
-
-
-def add_setting(add: Callable[..., Any], text: str = SET_HELP) -> None:
-    """Add `--set` by a parser's `add_argument`."""
-    add("--set", action="append", default=[], metavar="P.X=V", help=text)
 
 
 def importer_of(manager: Manager, path: Path) -> str | None:

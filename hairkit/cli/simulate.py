@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,15 +11,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hairkit.arrays import Float64Array
-from hairkit.cli.settings import add_setting, importer_of, split_settings
-from hairkit.cli.written import add_json, check_target, print_written
+from hairkit.cli.arguments import Add, add_shared, check_range
+from hairkit.cli.settings import importer_of, split_settings
+from hairkit.cli.written import check_target, print_written
 from hairkit.errors import InputError
 
 if TYPE_CHECKING:
     from hairkit.manager import Manager
     from hairkit.types.groom import Groom
 
-_DESCRIPTION = """\
+DESCRIPTION = """\
 Example: hairkit simulate out/groom.npz -o cache.npz --shake yaw:20:1.5 --wind 3,0,1
 
 Simulate a groom's guides and write a point cache (.npz), or a file with the animation in it, by the
@@ -41,12 +41,8 @@ STRONGEST_WIND = 200
 """Metres per second along an axis; the strongest storms have about 100."""
 
 
-def register(subparsers: Any) -> None:
-    """Add the verb to the command line."""
-    parser = subparsers.add_parser(
-        "simulate", help="simulate a groom's guides", description=_DESCRIPTION
-    )
-    add = parser.add_argument
+def add_arguments(add: Add) -> None:
+    """Add the arguments."""
     add("groom", metavar="GROOM", type=Path, help="groom.npz, or a file that a plugin imports")
     add("-o", "--out", required=True, type=Path, metavar="FILE", help="cache.npz, or hair.abc, ...")
     add("--guides", type=int, metavar="N", help="choose N guides from full hair (the groom's own)")
@@ -58,13 +54,9 @@ def register(subparsers: Any) -> None:
     add("--wind", default="0,0,0", metavar="X,Y,Z", help="metres per second (0,0,0)")
     add("--turbulence", type=float, default=0.0, metavar="T", help="gusts over the wind (0)")
     add("--gravity", type=float, metavar="G", help="m/s^2 downwards; the groom's by default")
-    add_setting(add)
     add("--preset", metavar="NAME", help="options saved by hairkit view beside the groom")
     add("--using", metavar="NAME", help=f"simulator plugin ({SIMULATOR}, or the preset's)")
-    add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
-    add("--quiet", action="store_true", help="no progress")
-    add_json(add)
-    add("--steps", action="store_true", help="a line for each step, for programs that show them")
+    add_shared(add, "--set", "--plugin", "--quiet", "--steps", "--json")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -92,7 +84,8 @@ def _run(args: argparse.Namespace) -> int:
     options = manager.options(using, kept | settings["simulator"])
     if exporter is not None:
         manager.options(exporter, settings["writer"])  # refused before the simulation, not after
-    weather = Weather(_vector("--wind", args.wind), args.turbulence, _gravity(args.gravity))
+    down = None if args.gravity is None else np.array([0.0, -args.gravity, 0.0])
+    weather = Weather(_vector("--wind", args.wind), args.turbulence, down)
     groom = _groom(args, manager, settings["reader"])
     motion = static_motion() if args.motion is None else read_motion(args.motion)
     motion = add_shakes(args.shake, groom.head, motion)
@@ -133,16 +126,11 @@ def _groom(args: argparse.Namespace, manager: Manager, settings: Mapping[str, ob
 
 
 def _check(args: argparse.Namespace) -> None:
-    if not 1 <= args.frames <= MOST_FRAMES:
-        raise InputError(f"--frames is {args.frames}, expected 1 to {MOST_FRAMES}")
-    if not LOWEST_RATE <= args.fps <= HIGHEST_RATE:
-        raise InputError(
-            f"--fps is {args.fps}, expected {LOWEST_RATE} to {HIGHEST_RATE} frames per second"
-        )
-    if not 0 <= args.warm_up <= LONGEST_WARM_UP:
-        raise InputError(f"--warm-up is {args.warm_up}, expected 0 to {LONGEST_WARM_UP} seconds")
-    if not 0 <= args.turbulence <= 10:
-        raise InputError(f"--turbulence is {args.turbulence}, expected 0 to 10 times the wind")
+    check_range("--frames", args.frames, 1, MOST_FRAMES)
+    check_range("--fps", args.fps, LOWEST_RATE, HIGHEST_RATE, "frames per second")
+    check_range("--warm-up", args.warm_up, 0, LONGEST_WARM_UP, "seconds")
+    check_range("--turbulence", args.turbulence, 0, 10, "times the wind")
+    check_range("--gravity", args.gravity, -1000, 1000, "metres per second squared")
     check_target(args.out)
 
 
@@ -158,14 +146,6 @@ def _vector(name: str, text: str) -> Float64Array:
     ):
         raise InputError(f"{name} is {text!r}, expected X,Y,Z up to {STRONGEST_WIND}, as 3,0,1")
     return vector
-
-
-def _gravity(down: float | None) -> Float64Array | None:
-    if down is None:
-        return None
-    if not (math.isfinite(down) and abs(down) <= 1000):
-        raise InputError(f"--gravity is {down}, expected metres per second squared")
-    return np.array([0.0, -down, 0.0])
 
 
 def _preset(args: argparse.Namespace) -> tuple[str, dict[str, object]]:

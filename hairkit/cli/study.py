@@ -6,12 +6,12 @@ import argparse
 import hashlib
 import sys
 from pathlib import Path
-from typing import Any
 
-from hairkit.cli.written import add_json, print_written
+from hairkit.cli.arguments import LARGEST_SEED, Add, add_shared, check_range
+from hairkit.cli.written import print_written
 from hairkit.errors import InputError
 
-_DESCRIPTION = """\
+DESCRIPTION = """\
 Example: hairkit study anna/ ben/ carla/ deniz/ -o study/
          hairkit study study/ --answers answers-*.json
 
@@ -26,18 +26,14 @@ _IDENTITY_BYTES = 8
 """Of the name by which answers belong to a study."""
 
 
-def register(subparsers: Any) -> None:
-    """Add the verb to the command line."""
-    parser = subparsers.add_parser(
-        "study", help="make a questionnaire: which hair is whose", description=_DESCRIPTION
-    )
-    add = parser.add_argument
+def add_arguments(add: Add) -> None:
+    """Add the arguments."""
     add("folders", nargs="+", type=Path, metavar="OUT", help="folders of reconstruct; or a study")
     add("-o", "--output", type=Path, metavar="DIR", help="folder for the questionnaire")
     add("--questions", type=int, default=QUESTIONS, metavar="N", help=f"each way ({QUESTIONS})")
     add("--seed", type=int, default=0, help="of choices and views (0)")
     add("--answers", nargs="+", type=Path, metavar="FILE", help="answers to count")
-    add_json(add)
+    add_shared(add, "--json")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -46,10 +42,8 @@ def run(args: argparse.Namespace) -> int:
         return _count(args)
     if args.output is None:
         raise InputError("where to? give -o FOLDER for the questionnaire")
-    if not 1 <= args.questions <= MOST_QUESTIONS:
-        raise InputError(f"--questions is {args.questions}, expected 1 to {MOST_QUESTIONS}")
-    if args.seed < 0:
-        raise InputError(f"--seed is {args.seed}, expected 0 or more")
+    check_range("--questions", args.questions, 1, MOST_QUESTIONS)
+    check_range("--seed", args.seed, 0, LARGEST_SEED)
     return _make(args)
 
 

@@ -5,15 +5,14 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import Any
 
+from hairkit.cli.arguments import LARGEST_SEED, Add, add_shared, check_range
 from hairkit.cli.render import parse_size
-from hairkit.cli.written import add_json, print_written
-from hairkit.errors import InputError
+from hairkit.cli.written import print_written
 from hairkit.head_model.template import default_head
 from hairkit.synth import STYLES, grow, photograph
 
-_DESCRIPTION = """\
+DESCRIPTION = """\
 Example: hairkit synth wavy -o wavy/
 
 Grow a groom and take photos of it: photos/, masks/, landmarks.json, groom.npz, and truth/ for
@@ -24,31 +23,24 @@ STRANDS = 10_000
 """Hairs by default: a tenth of a head's."""
 
 
-def register(subparsers: Any) -> None:
-    """Add the verb to the command line."""
-    parser = subparsers.add_parser("synth", help="make photos", description=_DESCRIPTION)
-    parser.add_argument("style", metavar="STYLE", help=", ".join(STYLES))
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="folder")
-    parser.add_argument(
-        "--strands", type=int, default=STRANDS, metavar="N", help=f"hairs ({STRANDS})"
-    )
-    parser.add_argument("--seed", type=int, default=0, help="of hair, cameras and room (0)")
-    parser.add_argument("--views", type=int, default=VIEWS, metavar="N", help=f"photos ({VIEWS})")
-    parser.add_argument("--size", default="810x1080", metavar="WxH", help="photos (810x1080)")
-    parser.add_argument(
-        "--jitter", type=float, default=1.0, help="how far cameras leave the nominal turn (1)"
-    )
-    parser.add_argument("--orthographic", action="store_true", help="parallel rays")
-    add_json(parser.add_argument)
+def add_arguments(add: Add) -> None:
+    """Add the arguments."""
+    add("style", metavar="STYLE", help=", ".join(STYLES))
+    add("-o", "--output", type=Path, required=True, metavar="DIR", help="folder")
+    add("--strands", type=int, default=STRANDS, metavar="N", help=f"hairs ({STRANDS})")
+    add("--seed", type=int, default=0, help="of hair, cameras and room (0)")
+    add("--views", type=int, default=VIEWS, metavar="N", help=f"photos ({VIEWS})")
+    add("--size", default="810x1080", metavar="WxH", help="photos (810x1080)")
+    add("--jitter", type=float, default=1.0, help="how far cameras leave the nominal turn (1)")
+    add("--orthographic", action="store_true", help="parallel rays")
+    add_shared(add, "--json")
 
 
 def run(args: argparse.Namespace) -> int:
     """Grow, photograph, and print the folder."""
     size = parse_size(args.size)
-    if args.seed < 0:
-        raise InputError(f"--seed is {args.seed}, expected 0 or more")
-    if not 0 <= args.jitter <= 10:
-        raise InputError(f"--jitter is {args.jitter}, expected 0 to 10")
+    check_range("--seed", args.seed, 0, LARGEST_SEED)
+    check_range("--jitter", args.jitter, 0, 10)
     groom = grow(args.style, default_head(), args.strands, args.seed)
     print(f"{args.style}: {len(groom.strands)} strands grown", file=sys.stderr)
     photograph(

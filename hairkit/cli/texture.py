@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from hairkit.cli.settings import SET_HELP, add_setting, split_settings
-from hairkit.cli.written import add_json, check_target, print_written
+from hairkit.cli.arguments import Add, add_shared
+from hairkit.cli.settings import split_settings
+from hairkit.cli.written import check_target, print_written
 from hairkit.errors import InputError
 
 if TYPE_CHECKING:
     from hairkit.types.skin import Texture
     from hairkit.types.texture_example import TextureExample
 
-_DESCRIPTION = """\
+DESCRIPTION = """\
 Example: hairkit texture sharpen scan.png --example close_up.png -o sharp.png
 
 WORK is one of
@@ -37,10 +38,8 @@ _READY: dict[str, dict[str, object]] = {
 (`studies/texture_gallery.py`): sharp skin gains 4 dB over none, normal maps 7 to 9 dB."""
 
 
-def register(subparsers: Any) -> None:
-    """Add the verb to the command line."""
-    parser = subparsers.add_parser("texture", help="work on a texture", description=_DESCRIPTION)
-    add = parser.add_argument
+def add_arguments(add: Add) -> None:
+    """Add the arguments."""
     add("work", metavar="WORK", choices=WORKS, help=", ".join(WORKS))
     add("file", type=Path, metavar="FILE", help="the texture")
     add("-o", "--output", type=Path, required=True, metavar="OUT", help="picture to write")
@@ -51,9 +50,7 @@ def register(subparsers: Any) -> None:
     add("--blood", type=Path, metavar="FILE", help="grey map of blood, for tint")
     add("--melanin", type=Path, metavar="FILE", help="grey map of melanin, for tint")
     add("--difference", type=Path, metavar="FILE", help="write what changed, in false colours")
-    add_setting(add, SET_HELP)
-    add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
-    add_json(add)
+    add_shared(add, "--set", "--plugin", "--json")
 
 
 def run(args: argparse.Namespace) -> int:

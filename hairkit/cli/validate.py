@@ -8,15 +8,16 @@ import json
 from pathlib import Path
 from typing import Any
 
+from hairkit.cli.arguments import Add, add_shared
 from hairkit.cli.reader_settings import add_reader_arguments, reader_settings
-from hairkit.cli.settings import add_setting, split_settings
+from hairkit.cli.settings import split_settings
 from hairkit.errors import FormatError, InputError, one_line
 from hairkit.grooming.target_rules import TARGETS, check_groom
 from hairkit.manager import Manager
 from hairkit.pipeline.open_groom import load_groom, plugin_for
 from hairkit.types.finding import Finding
 
-_DESCRIPTION = """\
+DESCRIPTION = """\
 Example: hairkit validate hair.abc --for unreal
 
 Check a hair file against every rule that is known of a program: format, unit, axes, numbers of
@@ -27,18 +28,12 @@ BROKEN = 4
 """Exit code where a rule failed."""
 
 
-def register(subparsers: Any) -> None:
-    """Add the verb to the command line."""
-    parser = subparsers.add_parser(
-        "validate", help="check a hair file for an engine", description=_DESCRIPTION
-    )
-    parser.add_argument("file", metavar="FILE", type=Path, help="file that a plugin imports")
-    parser.add_argument(
-        "--for", dest="target", required=True, choices=tuple(TARGETS), help=", ".join(TARGETS)
-    )
-    add_reader_arguments(parser)
-    add_setting(parser.add_argument)
-    parser.add_argument("--json", action="store_true", help="print JSON")
+def add_arguments(add: Add) -> None:
+    """Add the arguments."""
+    add("file", metavar="FILE", type=Path, help="file that a plugin imports")
+    add("--for", dest="target", required=True, choices=tuple(TARGETS), help=", ".join(TARGETS))
+    add_reader_arguments(add)
+    add_shared(add, "--set", "--json")
 
 
 def run(args: argparse.Namespace) -> int:

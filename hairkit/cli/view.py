@@ -8,15 +8,15 @@ import sys
 from pathlib import Path
 from typing import Any, NoReturn
 
+from hairkit.cli.arguments import Add, add_shared, check_range
 from hairkit.cli.render import parse_size
-from hairkit.cli.settings import add_setting
-from hairkit.cli.written import add_json, print_written
+from hairkit.cli.written import print_written
 from hairkit.errors import InputError
 
 MOST_HAIRS = 200_000
 BUDGET_MS = 50
 """Milliseconds a picture may take by default: 20 pictures a second."""
-_DESCRIPTION = """\
+DESCRIPTION = """\
 Example: hairkit view out/groom.npz
 
 Show a groom in motion. GROOM is a groom.npz, any file that an import plugin reads, or the folder
@@ -24,14 +24,11 @@ that `hairkit reconstruct` wrote. Press H for the keys. With --headless a script
 would do: hairkit view out/ --headless --script steps.toml --out pictures/"""
 
 
-def register(subparsers: Any) -> None:
-    """Add the verb to the command line."""
-    parser = subparsers.add_parser("view", help="show a groom in motion", description=_DESCRIPTION)
-    add = parser.add_argument
+def add_arguments(add: Add) -> None:
+    """Add the arguments."""
     add("groom", metavar="GROOM", type=Path, help="groom.npz, importable file or folder of results")
     add("--capture", metavar="C", help="the photos, to show them in space: a folder, a video, ...")
     add("--simulator", metavar="NAME", help="simulator plugin (rods), or none")
-    add_setting(add)
     add("--preset", metavar="NAME", help="simulator options saved beside the groom")
     add("--hairs", type=int, metavar="N", help="strands drawn (10000)")
     add("--size", metavar="WxH", help="pixels (1280x720)")
@@ -39,9 +36,8 @@ def register(subparsers: Any) -> None:
     add("--headless", action="store_true", help="no window: run --script")
     add("--script", type=Path, metavar="FILE", help="actions to run (TOML)")
     add("--out", type=Path, metavar="FOLDER", help="where a script's pictures go (.)")
-    add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
     add("--actions", action=_ListActions, nargs=0, help="list the actions of scripts, and exit")
-    add_json(add)
+    add_shared(add, "--set", "--plugin", "--json")
 
 
 class _ListActions(argparse.Action):
@@ -74,8 +70,7 @@ def _check(args: argparse.Namespace) -> None:
     from hairkit.pipeline.open_groom import groom_path
 
     groom_path(args.groom)
-    if args.hairs is not None and not 0 <= args.hairs <= MOST_HAIRS:
-        raise InputError(f"--hairs is {args.hairs}, expected 0 to {MOST_HAIRS}")
+    check_range("--hairs", args.hairs, 0, MOST_HAIRS)
 
 
 def _window(args: argparse.Namespace) -> int:

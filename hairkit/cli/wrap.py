@@ -5,19 +5,19 @@ from __future__ import annotations
 import argparse
 import time
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from hairkit.cli.settings import add_setting, importer_of, split_settings
-from hairkit.cli.written import add_json, check_target, print_written
+from hairkit.cli.arguments import Add, add_shared
+from hairkit.cli.settings import importer_of, split_settings
+from hairkit.cli.written import check_target, print_written
 from hairkit.errors import InputError
 from hairkit.io.head_reader import UNITS, BareHead, read_bare_head
 from hairkit.manager import Manager
 from hairkit.pipeline.open_groom import load_groom, plugin_for
 from hairkit.types.groom import Groom
 
-_DESCRIPTION = """\
+DESCRIPTION = """\
 Example: hairkit wrap out/groom.npz --head other.glb -o other_hair.abc
 
 Carry a groom to another head of any mesh, found by its shape alone: roots onto its surface, scalp
@@ -31,13 +31,9 @@ More examples:
   hairkit wrap out/groom.npz --head other.glb -o hair.abc --source-head source.fbx"""
 
 
-def register(subparsers: Any) -> None:
-    """Add the verb to the command line."""
-    parser = subparsers.add_parser(
-        "wrap", help="carry a groom to another head", description=_DESCRIPTION
-    )
-    add = parser.add_argument
-    add("groom", metavar="GROOM", help="groom.npz, or a file that an import plugin reads")
+def add_arguments(add: Add) -> None:
+    """Add the arguments."""
+    add("groom", metavar="GROOM", type=Path, help="groom.npz, or a file that a plugin reads")
     add("--head", type=Path, required=True, metavar="FILE", help="the other head")
     add("-o", "--out", type=Path, required=True, metavar="FILE", help="file to write")
     add("--units", choices=tuple(UNITS), default="m", help="unit of the head's file (m)")
@@ -45,10 +41,7 @@ def register(subparsers: Any) -> None:
     add("--scalp", metavar="NAME", help="group or mask picture that is the head's scalp")
     add("--keep-root-uv", action="store_true", help="keep the roots' texture coordinates")
     add("--source-head", type=Path, metavar="FILE", help="write the groom's own head too (.fbx)")
-    add_setting(add)
-    add("--using", metavar="NAME", help="export plugin (default: by suffix)")
-    add("--plugin", action="append", default=[], metavar="FILE", help="load a plugin file too")
-    add_json(add)
+    add_shared(add, "--set", "--using", "--plugin", "--json")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -57,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
     from hairkit.pipeline.head_alone import write_head
 
     start = time.perf_counter()
-    manager, source = Manager.loaded(args.plugin), Path(args.groom)
+    manager, source = Manager.loaded(args.plugin), args.groom
     exporter = args.using or plugin_for(manager, "export_groom", args.out)
     manager.implementer("export_groom", exporter)
     plugins = {"reader": importer_of(manager, source), "writer": exporter}

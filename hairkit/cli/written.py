@@ -5,16 +5,11 @@ from __future__ import annotations
 import argparse
 import json
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from hairkit.errors import InputError
-
-
-def add_json(add: Callable[..., Any]) -> None:
-    """Add `--json` to a verb's parser, given its `add_argument`."""
-    add("--json", action="store_true", help="print what was written as JSON")
 
 
 def print_written(

@@ -220,7 +220,7 @@ def test_every_verb_is_a_file() -> None:
     assert {verb.replace("-", "_") for verb in cli.VERBS} <= files
     for verb in cli.VERBS:
         module = importlib.import_module(f"hairkit.cli.{verb.replace('-', '_')}")
-        assert callable(module.register)
+        assert callable(module.add_arguments)
         assert callable(module.run)
 
 
