@@ -2,24 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 GREEN, AMBER, RED = "green", "amber", "red"
-
-
-@dataclass(frozen=True)
-class Limits:
-    """The limits of one figure; it rises towards green where `green` is above `red`."""
-
-    green: float
-    red: float
-
-    def light(self, value: float) -> str:
-        """Return the light of a value: green or red at the limits themselves, amber between."""
-        sign = 1.0 if self.green > self.red else -1.0
-        if sign * value >= sign * self.green:
-            return GREEN
-        return RED if sign * value <= sign * self.red else AMBER
 
 
 @dataclass(frozen=True)
@@ -35,7 +20,7 @@ class Figure:
     """`green`, `amber` or `red`."""
     note: str = ""
     """What to look at when it is not green."""
-    digits: int = field(default=2)
+    digits: int = 2
 
     def line(self) -> str:
         """Return the figure as a line of the log.
@@ -46,3 +31,27 @@ class Figure:
         advice = f"; {self.note}" if self.note and self.light != GREEN else ""
         value = f"{self.value:.{self.digits}f}{' ' if self.unit else ''}{self.unit}"
         return f"{self.light:<6} {self.stage}: {self.name} {value}{advice}"
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a figure is called, and its limits; green may be above red or below."""
+
+    green: float
+    red: float
+    stage: str = ""
+    name: str = ""
+    unit: str = ""
+    digits: int = 2
+
+    def light(self, value: float) -> str:
+        """Return the light of a value: green or red at the limits themselves, amber between."""
+        sign = 1.0 if self.green > self.red else -1.0
+        if sign * value >= sign * self.green:
+            return GREEN
+        return RED if sign * value <= sign * self.red else AMBER
+
+    def figure(self, value: float, note: str = "", light: str = "") -> Figure:
+        """Return the figure of a value, with the light that the limits or the caller give it."""
+        shown = light or self.light(value)
+        return Figure(self.stage, self.name, value, self.unit, shown, note, self.digits)

@@ -48,59 +48,59 @@ FACE = [*range(2, 15), *range(28, 68)]
 head. Brows and temples lie under fringes."""
 FACING_DEG = 60.0
 """Views farther from the front, degrees of azimuth, show too little of the face to judge it."""
-MARGIN = Limits(1.25, 1.0)
+MARGIN = Limits(1.25, 1.0, "turn", "margin over the next best")
 """Of 241 turns and parts above the first 10 were wrong, of 46 below 1.1 20; two good captures are
 between 1.01 and 1.1, so that only a tie is red."""
-GAP_DEG = Limits(100.0, 160.0)
+GAP_DEG = Limits(100.0, 160.0, "turn", "largest step", "deg", 0)
 """Largest step of a turn: what no photo shows is guessed."""
-LANDMARK_VIEWS = Limits(2, 0)
+LANDMARK_VIEWS = Limits(2, 0, "landmarks", "views used", digits=0)
 """Views whose landmarks are known. Without any the head's size is a guess: on the captures it came
 out 1.17 to 1.59 times too large."""
-LANDMARK_MM = Limits(3.0, 5.5)
+LANDMARK_MM = Limits(3.0, 5.5, "cameras", "landmarks off by", "mm", 1)
 """At most 1.4 mm on six captures as they are, 2.3 with landmarks found by `face_mesh`; 2.4 to 11
 with moved masks, 8 to 32 with wrong azimuths, 10 to 27 when shuffled."""
-OUTLINE_MM = Limits(1.8, 3.0)
+OUTLINE_MM = Limits(1.8, 3.0, "cameras", "outlines off by", "mm", 1)
 """At most 0.9 mm on captures as they are, 1.6 with masks made without help, 2.6 where an afro or a
 real turn has no sharp outline; 1.3 to 4 with two heads, 8 and more when shuffled."""
-PUPIL_MM = Limits(7.5, 13.0)
+PUPIL_MM = Limits(7.5, 13.0, "head", "distance of the pupils", "mm", 1)
 """Off the mean distance of adult pupils: 95 % of adults lie within the first (Dodgson 2004), few
 beyond the second; the captures as they are came out 57 to 65 mm apart, shuffled ones below 46."""
 ADULT_PUPILS_MM = 63.4
 """Mean distance of the pupils of adults (Dodgson 2004)."""
-COVERED = Limits(0.9, 0.8)
+COVERED = Limits(0.9, 0.8, "masks", "hair that all views agree on, worst view")
 """At least 0.91 on captures as they are; at most 0.86 when shuffled, 0.89 with two heads."""
-AGREEMENT = Limits(0.75, 0.68)
+AGREEMENT = Limits(0.75, 0.68, "hull", "overlap with the masks")
 """At least 0.82 on captures as they are, 0.77 on photos alone; at most 0.62 when
 shuffled, 0.65 with wrong azimuths."""
-BARE_FACE = Limits(0.02, 0.2)
+BARE_FACE = Limits(0.02, 0.2, "masks", "face called hair")
 """At most 0.01 on captures as they are; 0.46 with a beard in the masks, 0.3 to 1 with the face."""
-GROWN = Limits(0.98, 0.9)
+GROWN = Limits(0.98, 0.9, "strands", "roots grown")
 """1.00 on all captures; a warning is logged below the first."""
 LENGTH = Limits(0.3, 0.15)
 """Mean length over the longest way through the hair: at least 0.87 on captures as they are; 0.08
 to 0.25 on most that were shuffled."""
-PARTING_MM = Limits(25.0, 50.0)
+PARTING_MM = Limits(25.0, 50.0, "parting", "width of the skin", "mm", 0)
 """Width of the middle half of the skin that shows on the crown: 6 to 25 mm around partings, 90 mm
 where a bare hairline is all that shows; evenly spread skin is 66 mm wide."""
-CROWN = Limits(0.2, 0.0)
+CROWN = Limits(0.2, 0.0, "parting", "sureness")
 """How well the views' directions agree with the way the crown is combed: 0.25 to 0.92 on drawn
 heads."""
 TIE = Limits(0.4, 0.0)
 """The weakest sign of a tie, see `hairkit.field.find_ties`: 0.6 at a ponytail."""
-ORIENTED = Limits(0.27, 0.2)
+ORIENTED = Limits(0.27, 0.2, "orient", "angles as photographed")
 """At least 0.72 with `structure_tensor` on ten captures, 0.30 with `gabor`; 0.22 of directions at
 random, below 0.1 where they are wrong. Without confidence 0."""
-DIRECTIONS = Limits(0.7, 0.5)
+DIRECTIONS = Limits(0.7, 0.5, "strands", "directions as photographed")
 """0.88 to 0.97 on six captures of straight hair, photos alone, 0.76 on short hair; at most 0.44
 with strands turned by 45 degrees, 0.32 with curls, 0.23 where coils came out straight."""
-COHERENCE = Limits(0.28, 0.34)
+COHERENCE = Limits(0.28, 0.34, "strands", "direction of curly hair")
 """Of photos of hair that came out in steep curls: 0.14 on coils, 0.35 to 0.55 on straight hair."""
-ASTRAY = Limits(0.08, 0.15)
+ASTRAY = Limits(0.08, 0.15, "strands", "drawn where no photo has hair")
 """At most 0.07 on captures as they are; 0.11 to 0.54 with turned strands, but on short hair."""
-BARE_HAIR = Limits(0.09, 0.18)
+BARE_HAIR = Limits(0.09, 0.18, "strands", "hair left bare")
 """At most 0.05 on captures of hair without coils, photos alone, 0.08 with true masks, which have
 wisps; 0.24 and more with strands of 0.6 of their length."""
-CURL_MM = Limits(15.0, 30.0)
+CURL_MM = Limits(15.0, 30.0, "strands", "radius of the curls", "mm", 1)
 """Radius of the curls: 7 mm on the tightest of the captures; locks of wider curls are bends."""
 
 
@@ -160,13 +160,12 @@ def assess_turn(turn: Turnaround | None) -> tuple[Figure, ...]:
     if turn is None:
         return ()
     gap, margin, count = turn.largest_step_deg, turn.margin, len(turn.doubts)
-    note = "take photos from there, too"
-    step = Figure("turn", "largest step", gap, "deg", GAP_DEG.light(gap), note, 0)
+    step = GAP_DEG.figure(gap, "take photos from there, too")
     if not np.isfinite(margin):
         return (step,)
-    note, light = "name the photos", AMBER if turn.doubts else GREEN
+    light = AMBER if turn.doubts else GREEN
     return (
-        Figure("turn", "margin over the next best", margin, "", MARGIN.light(margin), note),
+        MARGIN.figure(margin, "name the photos"),
         step,
         Figure("turn", "doubts", count, "", light, "; ".join(turn.doubts), 0),
     )
@@ -178,13 +177,9 @@ def assess_landmarks(capture: Capture, scene: Scene) -> tuple[Figure, ...]:
         (v, c) for v, c in zip(capture.views, scene.cameras, strict=True) if v.landmarks is not None
     ]
     count = len(known)
-    light = GREEN if count == len(capture.views) else LANDMARK_VIEWS.light(count)
-    figures = [
-        Figure(
-            "landmarks", "views used", count, "", light,
-            "no face was found, so the size of the head is a guess; give landmarks.json", 0,
-        )
-    ]  # fmt: skip
+    note = "no face was found, so the size of the head is a guess; give landmarks.json"
+    light = GREEN if count == len(capture.views) else ""
+    figures = [LANDMARK_VIEWS.figure(count, note, light)]
     corners = scene.head.landmark_vertices
     if corners is None:
         return tuple(figures)
@@ -193,17 +188,12 @@ def assess_landmarks(capture: Capture, scene: Scene) -> tuple[Figure, ...]:
     known = [each for each, far in zip(known, steep, strict=True) if not far]
     gaps = [_misfit_mm(camera, points, view.landmarks) for view, camera in known]
     if gaps:
-        worst = int(np.argmax(gaps))
-        figures.append(
-            Figure(
-                "cameras", "landmarks off by", max(gaps), "mm", LANDMARK_MM.light(max(gaps)),
-                f"look at {_label(known[worst][0])}", 1,
-            )
-        )  # fmt: skip
+        worst = known[int(np.argmax(gaps))][0]
+        figures.append(LANDMARK_MM.figure(max(gaps), f"look at {_label(worst)}"))
     pupils = 1000 * float(np.linalg.norm(np.subtract(*(points[e].mean(axis=0) for e in EYES))))
     light = PUPIL_MM.light(abs(pupils - ADULT_PUPILS_MM))
     note = "not an adult's: lengths in metres are off by as much"
-    return (*figures, Figure("head", "distance of the pupils", pupils, "mm", light, note, 1))
+    return (*figures, PUPIL_MM.figure(pupils, note, light))
 
 
 def assess_cameras(scene: Scene) -> tuple[Figure, ...]:
@@ -212,7 +202,7 @@ def assess_cameras(scene: Scene) -> tuple[Figure, ...]:
         return ()
     off = 1000 * scene.residual_px / np.mean([c.pixels_per_metre for c in scene.cameras]).item()
     note = f"{scene.residual_px:.1f} px; are all photos of one head, in the order of the turn?"
-    return (Figure("cameras", "outlines off by", off, "mm", OUTLINE_MM.light(off), note, 1),)
+    return (OUTLINE_MM.figure(off, note),)
 
 
 def assess_masks(masks: Sequence[Mask], scene: Scene) -> tuple[Figure, ...]:
@@ -230,7 +220,7 @@ def assess_masks(masks: Sequence[Mask], scene: Scene) -> tuple[Figure, ...]:
         return ()
     name, share = max(shares.items(), key=lambda item: item[1])
     note = f"glasses, beard or skin became hair; look at the mask of {name}"
-    return (Figure("masks", "face called hair", share, "", BARE_FACE.light(share), note),)
+    return (BARE_FACE.figure(share, note),)
 
 
 def assess_hull(hull: Hull, masks: Sequence[Mask], scene: Scene) -> tuple[Figure, ...]:
@@ -244,16 +234,8 @@ def assess_hull(hull: Hull, masks: Sequence[Mask], scene: Scene) -> tuple[Figure
     worst = min(inside, key=lambda name: inside[name])
     apart = min(overlap, key=lambda name: overlap[name])
     mean = float(np.mean(list(overlap.values())))
-    return (
-        Figure(
-            "masks", "hair that all views agree on, worst view", inside[worst], "",
-            COVERED.light(inside[worst]),
-            f"the mask of {worst} and those of the other views contradict each other",
-        ),
-        Figure(
-            "hull", "overlap with the masks", mean, "", AGREEMENT.light(mean), f"look at {apart}"
-        ),
-    )  # fmt: skip
+    note = f"the mask of {worst} and those of the other views contradict each other"
+    return COVERED.figure(inside[worst], note), AGREEMENT.figure(mean, f"look at {apart}")
 
 
 def compare_hull(
@@ -285,7 +267,7 @@ def assess_orientations(shown: Sequence[PhotoHair], evidence: Evidence) -> tuple
     shares = [share_oriented(*row) for row in zip(evidence.orientations, shown, strict=True)]
     share, name = float(np.mean(shares)), _worst(evidence.scene.names, shares)
     note = f"its plugin does not see the strands of the photos, least of all in {name}"
-    return (Figure("orient", "angles as photographed", share, "", ORIENTED.light(share), note),)
+    return (ORIENTED.figure(share, note),)
 
 
 def assess_parting(parting: Parting) -> tuple[Figure, ...]:
@@ -296,12 +278,9 @@ def assess_parting(parting: Parting) -> tuple[Figure, ...]:
     note = "add a photo from above, draw a stroke `parting` or give --parting"
     figures = []
     if parting.sureness < 1:
-        light = CROWN.light(parting.sureness)
-        figures.append(Figure("parting", "sureness", parting.sureness, "", light, note, 2))
+        figures.append(CROWN.figure(parting.sureness, note))
     if parting.spread and parting.places is None:  # directions tell more than such skin
-        width = 1000 * parting.spread
-        light = PARTING_MM.light(width)
-        figures.append(Figure("parting", "width of the skin", width, "mm", light, note, 0))
+        figures.append(PARTING_MM.figure(1000 * parting.spread, note))
     return tuple(figures)
 
 
@@ -330,13 +309,10 @@ def assess_strands(groom: Groom, roots: int, hair_length: float) -> tuple[Figure
     grown, length = len(strands) / roots, float(strands.lengths().mean())
     whole = LENGTH.light(length / max(hair_length, 1e-9))
     return (
-        Figure("strands", "roots grown", grown, "", GROWN.light(grown), "do masks leave out hair?"),
+        GROWN.figure(grown, "do masks leave out hair?"),
         Figure("strands", "mean length", 100 * length, "cm", whole, "they end within the hair", 1),
-        Figure(
-            "strands", "radius of the curls", radius, "mm", CURL_MM.light(radius),
-            "wider than locks of hair are; is the head's size right?", 1,
-        ),
-    )  # fmt: skip
+        CURL_MM.figure(radius, "wider than locks of hair are; is the head's size right?"),
+    )
 
 
 def assess_drawing(shown: Sequence[PhotoHair], scene: Scene, groom: Groom) -> tuple[Figure, ...]:
@@ -351,25 +327,20 @@ def assess_drawing(shown: Sequence[PhotoHair], scene: Scene, groom: Groom) -> tu
         shares = [share_of(view.right, view.judged) for view in views]
         share = share_of(sum(v.right for v in views), sum(v.judged for v in views))
         note = f"the hair lies otherwise than in the photos, most of all in {_worst(names, shares)}"
-        light = DIRECTIONS.light(share)
-        figures = [Figure("strands", "directions as photographed", share, "", light, note)]
+        figures = [DIRECTIONS.figure(share, note)]
     else:
         clear = float(np.mean([view.coherence for view in views]))
         note = "the photos show strands that run side by side; set curl_radius_mm = 0 in [hair]"
-        light = COHERENCE.light(clear)
-        figures = [Figure("strands", "direction of curly hair", clear, "", light, note)]
+        figures = [COHERENCE.figure(clear, note)]
     astray = [view.astray / max(view.shown, 1.0) for view in views]
     share = sum(v.astray for v in views) / max(sum(v.shown for v in views), 1.0)
     note = f"most of all in {_worst(names, [-each for each in astray])}"
-    light = ASTRAY.light(share)
-    figures.append(Figure("strands", "drawn where no photo has hair", share, "", light, note))
+    figures.append(ASTRAY.figure(share, note))
     left = [view.bare / max(view.standing, 1) for view in views]
     bare = sum(v.bare for v in views)
     share = bare / max(sum(v.standing for v in views), bare, 1)
     note = f"strands are too short, most of all in {_worst(names, [-each for each in left])}"
-    light = BARE_HAIR.light(share)
-    figures.append(Figure("strands", "hair left bare", share, "", light, note))
-    return tuple(figures)
+    return (*figures, BARE_HAIR.figure(share, note))
 
 
 def _worst(names: Sequence[str], values: Sequence[float]) -> str:
