@@ -29,13 +29,7 @@ import numpy.typing as npt
 
 from hairkit.errors import HairkitError, one_line
 from hairkit.storage import read_npz
-from hairkit.system import (
-    kill_group,
-    limit_process,
-    memory_folder,
-    own_group,
-    resident_bytes,
-)
+from hairkit.system import kill_group, limit_process, memory_folder, own_group, resident_bytes
 
 POLL_S = 0.05
 """Seconds between two looks at memory and output of a process that is at work."""
@@ -101,10 +95,7 @@ class ChildProcess:
         self._stopped = False
 
     def ask(
-        self,
-        question: Mapping[str, Any],
-        limits: Limits,
-        tell: Callable[[Any], None] | None = None,
+        self, question: Mapping[str, Any], limits: Limits, tell: Callable[[Any], None] | None = None
     ) -> dict[str, Any]:
         """Return the answer; `tell` gets what comes before it. Raises `ChildError`."""
         with self._turn:
@@ -310,10 +301,7 @@ class _Running:
 
 
 def ask_once(
-    program: Path,
-    question: Mapping[str, Any],
-    limits: Limits,
-    address_bytes: int | None = None,
+    program: Path, question: Mapping[str, Any], limits: Limits, address_bytes: int | None = None
 ) -> dict[str, Any]:
     """Return the result of the only question to a program of Python.
 
@@ -330,10 +318,7 @@ def ask_once(
 
 
 def ask_for_arrays(
-    program: Path,
-    question: Mapping[str, Any],
-    limits: Limits,
-    address_bytes: int | None = None,
+    program: Path, question: Mapping[str, Any], limits: Limits, address_bytes: int | None = None
 ) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
     """Return the result of `ask_once`, and the arrays that the program wrote.
 

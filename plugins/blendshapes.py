@@ -268,9 +268,7 @@ def _metres(camera: Camera, points: Float64Array) -> Float64Array:
     return np.maximum(camera.depth(points), 0) / camera.focal
 
 
-def _label_outlines(
-    masks: Sequence[Mask],
-) -> list[tuple[Float32Array, BoolArray, float]]:
+def _label_outlines(masks: Sequence[Mask]) -> list[tuple[Float32Array, BoolArray, float]]:
     """Return, for each view, the signed distance to the outline, where it is hair, and scale."""
     outlines = Outlines.of(masks, count=OUTLINE_POINTS)
     found = []

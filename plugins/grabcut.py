@@ -18,11 +18,7 @@ from hairkit.arrays import BoolArray, Float64Array, UInt8Array
 from hairkit.errors import InputError
 from hairkit.hookspecs import hookimpl
 from hairkit.imaging.masked_filters import picture_scale, reduced_size
-from hairkit.imaging.seeded_segmentation import (
-    UNKNOWN,
-    LabelSettings,
-    label_from_seeds,
-)
+from hairkit.imaging.seeded_segmentation import UNKNOWN, LabelSettings, label_from_seeds
 from hairkit.io.strokes import LINE_WIDTH, Stroke, Strokes, rasterise, read_view_strokes
 from hairkit.options import option
 from hairkit.types.capture import View

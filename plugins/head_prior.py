@@ -159,9 +159,7 @@ def _without_strangers(labels: list[UInt8Array], scene: Scene) -> list[UInt8Arra
 
 
 def _confirmed(
-    pixels: Float64Array,
-    camera: Camera,
-    others: list[tuple[Camera, UInt8Array, Float32Array]],
+    pixels: Float64Array, camera: Camera, others: list[tuple[Camera, UInt8Array, Float32Array]]
 ) -> BoolArray:
     """Return (N,) whether a point behind each pixel (N, 2) is hair in most views that see it."""
     along = camera.depth(np.zeros(3)) + np.arange(-_REACH, _REACH, _STEP)

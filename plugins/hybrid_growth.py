@@ -315,11 +315,7 @@ def _resample(path: Float64Array, points: Float32Array) -> None:
 
 @compiled_with(allocates=True)
 def _grow_strand(
-    volume: SignedVolume,
-    rules: Rules,
-    start: Float32Array,
-    limits: Int64Array,
-    path: Float64Array,
+    volume: SignedVolume, rules: Rules, start: Float32Array, limits: Int64Array, path: Float64Array
 ) -> int:
     """Write one strand's points into path (M, 3); return their number, at least 2."""
     p, d, found = np.empty(3), np.zeros(3), np.empty(5)

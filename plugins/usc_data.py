@@ -28,9 +28,7 @@ from hairkit.types.strand_blocks import blocks
 from hairkit.types.strands import Strands
 
 FORMAT = FileFormat(
-    "USC-HairSalon, CT2Hair",
-    (".data", ".bin"),
-    exact={Feature.POINTS, Feature.COUNTS},
+    "USC-HairSalon, CT2Hair", (".data", ".bin"), exact={Feature.POINTS, Feature.COUNTS}
 )
 
 

@@ -45,12 +45,7 @@ class DaskPool:
     """The workers that a Dask client knows."""
 
     def __init__(
-        self,
-        client: Any,
-        limits: JobLimits,
-        *,
-        threads: int = 1,
-        command: Sequence[str] = COMMAND,
+        self, client: Any, limits: JobLimits, *, threads: int = 1, command: Sequence[str] = COMMAND
     ) -> None:
         self._client = client
         self._limits = limits
@@ -59,10 +54,7 @@ class DaskPool:
         self._futures: dict[Any, tuple[Any, Job]] = {}
 
     def run(
-        self,
-        jobs: Sequence[tuple[Job, str]],
-        settings: Settings,
-        watcher: Watcher | None = None,
+        self, jobs: Sequence[tuple[Job, str]], settings: Settings, watcher: Watcher | None = None
     ) -> Iterator[Result]:
         """Yield results as they come; raises `SchedulerLostError` when the scheduler is gone."""
         watcher, waiting = watcher or Watcher(), iter(jobs)

@@ -63,10 +63,7 @@ class LocalPool:
         self._stopped = False
 
     def run(
-        self,
-        jobs: Sequence[tuple[Job, str]],
-        settings: Settings,
-        watcher: Watcher | None = None,
+        self, jobs: Sequence[tuple[Job, str]], settings: Settings, watcher: Watcher | None = None
     ) -> Iterator[Result]:
         """Yield results as they come, of jobs with their digests; closing it ends the processes."""
         waiting = deque(jobs)

@@ -32,13 +32,7 @@ from hairkit.cameras.landmark_equations import (
 )
 from hairkit.cameras.outlines import Outlines
 from hairkit.cameras.silhouette_coherence import coherence
-from hairkit.cameras.turntable import (
-    CENTRE,
-    LOG_MAGNIFICATION,
-    MIN_PERSPECTIVE,
-    PERSPECTIVE,
-    Turn,
-)
+from hairkit.cameras.turntable import CENTRE, LOG_MAGNIFICATION, MIN_PERSPECTIVE, PERSPECTIVE, Turn
 from hairkit.errors import InputError
 from hairkit.head_model.cranium import Cranium
 from hairkit.imaging.masked_filters import picture_scale
@@ -278,11 +272,7 @@ class TurnFit:
         return row / FOCAL_SPREAD, float(np.log(focal) - found) / FOCAL_SPREAD
 
     def _coherence_rows(
-        self,
-        vector: Float64Array,
-        cameras: CameraArrays,
-        tangents: Float64Array,
-        noise: float,
+        self, vector: Float64Array, cameras: CameraArrays, tangents: Float64Array, noise: float
     ) -> tuple[Float64Array, Float64Array, Float64Array]:
         """Return rows that bring contour rays into the silhouettes they miss, or nearly miss.
 

@@ -32,10 +32,7 @@ return read_folder(folder, max_edge) if folder.is_dir() else None""",
     ),
     "detect_landmarks": Sketch(
         "A face in the middle of the photo, seen from in front.",
-        (
-            _NUMPY,
-            "from hairkit.types.head import LANDMARKS",
-        ),
+        (_NUMPY, "from hairkit.types.head import LANDMARKS"),
         'noise: float = option(50.0, low=1.0, high=500.0, doc="Of each landmark.", unit="px")',
         """
 middle = np.tile([view.width / 2, view.height / 2], (LANDMARKS, 1))
@@ -61,10 +58,7 @@ return Turnaround(index, azimuth, level, names, np.inf, "turn as numbered")""",
     ),
     "segment": Sketch(
         "Everything dark is hair.",
-        (
-            _NUMPY,
-            "from hairkit.types.mask import HAIR",
-        ),
+        (_NUMPY, "from hairkit.types.mask import HAIR"),
         'threshold: int = option(90, low=1, high=254, doc="Darker pixels are hair.")',
         """
 dark = view.image.mean(axis=-1) < options.threshold
@@ -90,11 +84,7 @@ return Scene(tuple(view.name for view in capture.views), cameras, head)""",
     ),
     "refine_masks": Sketch(
         "Take specks off the hair.",
-        (
-            "import cv2",
-            _NUMPY,
-            "from hairkit.types.mask import HAIR, PERSON",
-        ),
+        ("import cv2", _NUMPY, "from hairkit.types.mask import HAIR, PERSON"),
         'radius: int = option(1, low=0, high=50, doc="Of the specks.", unit="px")',
         """
 refined = []
@@ -125,11 +115,7 @@ return Texture.encode(np.rint(stronger).astype(np.uint8))""",
     ),
     "orient": Sketch(
         "Strands run across the gradient of brightness.",
-        (
-            "import cv2",
-            _NUMPY,
-            "from hairkit.types.orientation import wrap_angle",
-        ),
+        ("import cv2", _NUMPY, "from hairkit.types.orientation import wrap_angle"),
         'sigma: float = option(2.0, low=0.5, high=20.0, doc="Blur before.", unit="px")',
         """
 grey = cv2.cvtColor(view.image, cv2.COLOR_RGB2GRAY).astype(np.float32)
@@ -141,11 +127,7 @@ return OrientationMap(wrap_angle(angle), strength / max(float(strength.max()), 1
     ),
     "build_hull": Sketch(
         "Cells outside the head that enough views see as hair.",
-        (
-            _NUMPY,
-            "from scipy.spatial import cKDTree",
-            "from hairkit.types.volume import VoxelGrid",
-        ),
+        (_NUMPY, "from scipy.spatial import cKDTree", "from hairkit.types.volume import VoxelGrid"),
         'votes: int = option(4, low=1, high=8, doc="Views that must see hair.")',
         """
 head = scene.head
@@ -184,10 +166,7 @@ return Strands(points.reshape(-1, 3), offsets, root_uv=roots.uv)""",
     ),
     "edit_groom": Sketch(
         "Strokes of hairkit's brushes, and of one that lets hair sink.",
-        (
-            _NUMPY,
-            "from hairkit.grooming import brushes",
-        ),
+        (_NUMPY, "from hairkit.grooming import brushes"),
         'drop: float = option(0.01, low=0.0, high=1.0, doc="Of the brush sink.", unit="m")',
         """
 def sink(hair, strokes):
@@ -201,10 +180,7 @@ return brushes.edit_groom(groom, edits, every)""",
     ),
     "make_simulator": Sketch(
         "Hair that goes rigidly with the head.",
-        (
-            _NUMPY,
-            "from hairkit.simulation import Measures, Surroundings",
-        ),
+        (_NUMPY, "from hairkit.simulation import Measures, Surroundings"),
         'sink: float = option(0.0, low=0.0, high=1.0, doc="Speed of falling.", unit="m/s")',
         "return Rigid(groom, options)",
         before='''

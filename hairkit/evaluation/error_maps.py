@@ -32,10 +32,7 @@ _WORST_DEG = 45.0
 
 
 def view_pictures(
-    evaluation: Evaluation,
-    truth: Truth,
-    view: int,
-    orientation: OrientationMap | None = None,
+    evaluation: Evaluation, truth: Truth, view: int, orientation: OrientationMap | None = None
 ) -> dict[str, UInt8Array]:
     """Return captioned RGB pictures (HEIGHT, W, 3) of one view."""
     evidence = evaluation.evidence

@@ -9,13 +9,7 @@ from typing import Any
 import numpy as np
 
 from hairkit.arrays import BoolArray, Float64Array
-from hairkit.evaluation.align import (
-    Alignment,
-    CameraError,
-    align,
-    alignment_points,
-    camera_errors,
-)
+from hairkit.evaluation.align import Alignment, CameraError, align, alignment_points, camera_errors
 from hairkit.evaluation.images import (
     DrawnDirections,
     OrientationError,

@@ -122,11 +122,7 @@ def mask_iou(first: npt.NDArray[np.bool_], second: npt.NDArray[np.bool_]) -> flo
 
 
 def hair_silhouette(
-    camera: Camera,
-    samples: Samples,
-    head: Head,
-    *,
-    clothes: npt.NDArray[np.bool_] | None = None,
+    camera: Camera, samples: Samples, head: Head, *, clothes: npt.NDArray[np.bool_] | None = None
 ) -> BoolArray:
     """Return (H, W) where hair drawn `HAIR_WIDTH` wide stands before the head.
 

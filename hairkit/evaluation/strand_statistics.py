@@ -119,12 +119,7 @@ def _maybe_inside(head: Head, points: npt.NDArray[np.float32]) -> BoolArray:
     return maybe
 
 
-def strand_consistency(
-    pred: Strands,
-    true: Strands,
-    *,
-    every: int = 10,
-) -> float:
+def strand_consistency(pred: Strands, true: Strands, *, every: int = 10) -> float:
     """Return how much of a true strand one single predicted strand follows, mean in [0, 1].
 
     For each true strand the largest share of its samples that any one predicted strand matches,

@@ -164,10 +164,7 @@ class _System(NamedTuple):
 
 
 def _conjugate_gradients(
-    system: _System,
-    right: Float32Array,
-    solution: Float32Array,
-    tolerance: float,
+    system: _System, right: Float32Array, solution: Float32Array, tolerance: float
 ) -> Float32Array:
     """Return the solution (N,) by Jacobi-preconditioned conjugate gradients from a guess.
 

@@ -90,11 +90,7 @@ class ScalpComb(NamedTuple):
 
 
 def comb_cells(
-    head: Head,
-    hull: Hull,
-    growth: Float32Array,
-    parting: Parting,
-    hair_length: float,
+    head: Head, hull: Hull, growth: Float32Array, parting: Parting, hair_length: float
 ) -> ScalpComb:
     """Return `combing_direction` at the centres of loose cells less than `REACH` off the head.
 

@@ -83,12 +83,7 @@ def comb_beside_parting(skin: Parting, front: Front) -> Parting:
 
 
 def comb_scalp(
-    skin: Parting,
-    front: Front,
-    sight: ScalpSight,
-    head: Head,
-    hull: Hull,
-    growth: Float32Array,
+    skin: Parting, front: Front, sight: ScalpSight, head: Head, hull: Hull, growth: Float32Array
 ) -> Parting:
     """Return how the crown is combed where no skin shows a parting: as the views see it.
 

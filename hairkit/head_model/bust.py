@@ -114,10 +114,7 @@ def _polar(off: Float64Array) -> tuple[Float64Array, Float64Array]:
 
 
 def _section(
-    middle: Float64Array,
-    ring: Float64Array,
-    neck: tuple[Float64Array, Float64Array],
-    off: float,
+    middle: Float64Array, ring: Float64Array, neck: tuple[Float64Array, Float64Array], off: float
 ) -> Float64Array:
     """Return a tilted ring (A, 3) in the same directions that stands `off` metres off the neck."""
     angle, distance = _polar(ring - middle)

@@ -64,10 +64,7 @@ def smallest_window(weight: Float32Array, margin: int = 0) -> tuple[slice, slice
 
 
 def _gradients(
-    mean: Float32Array,
-    pictures: Sequence[Float32Array],
-    shares: Sequence[Float32Array],
-    axis: int,
+    mean: Float32Array, pictures: Sequence[Float32Array], shares: Sequence[Float32Array], axis: int
 ) -> Float32Array:
     """Return the differences of neighbours along an axis, of the pictures that show both."""
     gradients = np.diff(mean, axis=axis)

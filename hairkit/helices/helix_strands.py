@@ -50,9 +50,7 @@ def first_frames(tangents: Float64Array) -> Float64Array:
     return np.stack([tangents, normal, np.cross(tangents, normal)], axis=-1)
 
 
-def _ranks(
-    offsets: Int64Array,
-) -> list[tuple[Int64Array, Int64Array | None, Int64Array]]:
+def _ranks(offsets: Int64Array) -> list[tuple[Int64Array, Int64Array | None, Int64Array]]:
     """Return, root to tip, the k-th arcs of all strands that have one, those before, strands."""
     counts = np.diff(offsets)
     steps: list[tuple[Int64Array, Int64Array | None, Int64Array]] = []

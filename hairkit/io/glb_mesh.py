@@ -59,10 +59,7 @@ def _parts(file: GlbFile) -> list[FileMesh]:
 
 
 def _primitive(
-    file: GlbFile,
-    primitive: dict[str, Any],
-    placed: Float64Array,
-    names: list[str],
+    file: GlbFile, primitive: dict[str, Any], placed: Float64Array, names: list[str]
 ) -> FileMesh:
     if primitive.get("extensions", {}).keys() & {"KHR_draco_mesh_compression"}:
         raise ValueError("it is compressed with Draco: export it without compression")

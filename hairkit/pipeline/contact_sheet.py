@@ -90,10 +90,7 @@ def write_contact_sheet(
 
 
 def contact_sheet(
-    capture: Capture,
-    evidence: Evidence,
-    groom: Groom,
-    health: Sequence[Figure] = (),
+    capture: Capture, evidence: Evidence, groom: Groom, health: Sequence[Figure] = ()
 ) -> UInt8Array:
     """Return the sheet (H, W, 3) RGB that `write_contact_sheet` writes."""
     size = _tile_size(evidence.scene.cameras)

@@ -27,14 +27,7 @@ from hairkit.pipeline.find_views import find_views
 from hairkit.pipeline.found import Found, found, result_of
 from hairkit.pipeline.judge_turn import judge_turn
 from hairkit.pipeline.own_head import mark_head
-from hairkit.pipeline.stage_runner import (
-    Given,
-    StageRunner,
-    Views,
-    completed,
-    gather,
-    given_photo,
-)
+from hairkit.pipeline.stage_runner import Given, StageRunner, Views, completed, gather, given_photo
 from hairkit.pipeline.work_folder import digest_of
 from hairkit.stages import (
     DISTANCE,
@@ -356,10 +349,7 @@ class Findings:
         )  # fmt: skip
 
     def _solve(
-        self,
-        stage: Stage[Scene],
-        masks: Given[tuple[Mask, ...]],
-        start: Given[Scene] | None = None,
+        self, stage: Stage[Scene], masks: Given[tuple[Mask, ...]], start: Given[Scene] | None = None
     ) -> Given[Scene]:
         begin: Any = Given.of(None) if start is None else start
         return self.run.once(stage, capture=self.plain, masks=masks, head=self.rest, start=begin)

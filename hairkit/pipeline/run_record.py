@@ -123,12 +123,7 @@ class RunRecord:
 
 
 def describe_run(
-    capture: Capture,
-    head: object,
-    recipe: Recipe,
-    manager: Manager,
-    guides: int,
-    seed: int,
+    capture: Capture, head: object, recipe: Recipe, manager: Manager, guides: int, seed: int
 ) -> RunRecord:
     """Return the record of a run that is about to start.
 

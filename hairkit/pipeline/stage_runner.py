@@ -68,12 +68,7 @@ class StageRunner:
     """
 
     def __init__(
-        self,
-        recipe: Recipe,
-        manager: Manager,
-        work: WorkFolder | None,
-        log: RunLog,
-        pool: Executor,
+        self, recipe: Recipe, manager: Manager, work: WorkFolder | None, log: RunLog, pool: Executor
     ) -> None:
         self.recipe = recipe
         self.manager = manager

@@ -16,10 +16,7 @@ from hairkit.types.capture import Capture
 
 
 def take_capture(
-    source: str | os.PathLike[str],
-    recipe: Recipe,
-    manager: Manager,
-    max_edge: int = WORKING_EDGE,
+    source: str | os.PathLike[str], recipe: Recipe, manager: Manager, max_edge: int = WORKING_EDGE
 ) -> Capture:
     """Return the photos of a source by the first of the recipe's plugins that knows it.
 

@@ -28,13 +28,7 @@ from __future__ import annotations
 
 from hairkit.simulation.motion import HeadMotion, Shake, add_shakes, read_motion, static_motion
 from hairkit.simulation.running import Weather, run
-from hairkit.simulation.simulator import (
-    Grab,
-    Measures,
-    Simulator,
-    Surroundings,
-    check_grabs,
-)
+from hairkit.simulation.simulator import Grab, Measures, Simulator, Surroundings, check_grabs
 
 __all__ = [
     "Grab",

@@ -109,14 +109,7 @@ class Bodies:
         depth = np.zeros(len(points))
         least = np.minimum(least, 0.0)
         parallel_for(
-            depths,
-            len(points),
-            self.fields,
-            torso_from_head,
-            points,
-            least,
-            depth,
-            min_chunk=WORTH,
+            depths, len(points), self.fields, torso_from_head, points, least, depth, min_chunk=WORTH
         )
         return float(depth.max(initial=0.0))
 

@@ -183,11 +183,7 @@ def recipe() -> Recipe:
 
 
 def _see(
-    request: dict[str, Any],
-    *,
-    strands: bool,
-    edge: int = OUTLINE_EDGE,
-    folder: str | None = None,
+    request: dict[str, Any], *, strands: bool, edge: int = OUTLINE_EDGE, folder: str | None = None
 ) -> SeenPhoto:
     """Return what the recipe finds in a photo, as `read_capture` and `reconstruct` would."""
     path = Path(request["photo"])

@@ -27,10 +27,7 @@ AT_ONCE = asyncio.Semaphore(4)
 """Uploads that are received at the same time; others wait."""
 DEEPEST = 12
 """Nested brackets of a JSON document; labelme's has five."""
-_MAGIC = {
-    "photo": (b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n"),
-    "video": (b"\x1aE\xdf\xa3", b"RIFF"),
-}
+_MAGIC = {"photo": (b"\xff\xd8\xff", b"\x89PNG\r\n\x1a\n"), "video": (b"\x1aE\xdf\xa3", b"RIFF")}
 """First bytes of JPEG and PNG, of Matroska (WebM) and AVI; ISO files have `ftyp` at byte 4."""
 _FIRST = 12
 

@@ -250,11 +250,7 @@ def _cluttered_room(camera: Camera, generator: np.random.Generator) -> UInt8Arra
 
 
 def _write_landmarks(
-    base: Path,
-    head: Head,
-    stems: list[str],
-    cameras: list[Camera],
-    generator: np.random.Generator,
+    base: Path, head: Head, stems: list[str], cameras: list[Camera], generator: np.random.Generator
 ) -> None:
     """Write what a detector would find: 68 points in the views that show the face."""
     if head.landmark_vertices is None:

@@ -56,8 +56,5 @@ class NodeOptions:
     def resolved(self: _Options, physics: HairPhysics) -> _Options:
         """Return the options with None replaced by the groom's value, clamped to its bounds."""
         return fill_options(
-            self,
-            stiffness=physics.stiffness,
-            damping=physics.damping,
-            friction=physics.friction,
+            self, stiffness=physics.stiffness, damping=physics.damping, friction=physics.friction
         )

@@ -93,10 +93,5 @@ def read_cameras(path: str | os.PathLike[str]) -> tuple[tuple[str, ...], tuple[C
         views = json.loads(read_text(path))["views"]
         names = tuple(str(view.get("name", index)) for index, view in enumerate(views))
         return names, tuple(Camera.from_json(view) for view in views)
-    except (
-        json.JSONDecodeError,
-        KeyError,
-        TypeError,
-        AttributeError,
-    ) as error:
+    except (json.JSONDecodeError, KeyError, TypeError, AttributeError) as error:
         raise FormatError(f"{path}: no cameras could be read ({error})") from error

@@ -69,10 +69,7 @@ class Turnaround(Stored):
 
 
 def moved_photos(
-    azimuth_deg: Float64Array,
-    above: BoolArray,
-    other_deg: Float64Array,
-    other_above: BoolArray,
+    azimuth_deg: Float64Array, above: BoolArray, other_deg: Float64Array, other_above: BoolArray
 ) -> BoolArray:
     """Return which photos (V,) have another place in another arrangement.
 

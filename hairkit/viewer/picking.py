@@ -70,10 +70,7 @@ def nearest_hair(
 
 
 def grab_lock(
-    camera: Camera,
-    points: Float32Array,
-    offsets: Int64Array,
-    pixel: npt.ArrayLike,
+    camera: Camera, points: Float32Array, offsets: Int64Array, pixel: npt.ArrayLike
 ) -> GrabbedLock | None:
     """Return the lock around the place of a guide at a pixel; None if there is no hair.
 

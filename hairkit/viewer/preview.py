@@ -51,11 +51,7 @@ class Preview:
     """Draws a session; use it inside `renderer()` only."""
 
     def __init__(
-        self,
-        gl: Renderer,
-        session: Session,
-        budget: Budget | None = None,
-        soft: bool | None = None,
+        self, gl: Renderer, session: Session, budget: Budget | None = None, soft: bool | None = None
     ) -> None:
         """Draw within a frame budget (None: best quality); `soft` as in `FrameRenderer`."""
         self.gl = gl
@@ -154,14 +150,7 @@ class Preview:
         self._draw(quality, self.session.camera((width, height)), first=still)
         self._compare()
 
-    def _draw(
-        self,
-        quality: Quality,
-        camera: Camera,
-        *,
-        first: bool,
-        fine: bool = False,
-    ) -> None:
+    def _draw(self, quality: Quality, camera: Camera, *, first: bool, fine: bool = False) -> None:
         """Draw a picture, or a sample of a still one, whose `first` brings the light up to date."""
         frame_renderer, session = self.frame_renderer, self.session
         rows = session.guide_rows()

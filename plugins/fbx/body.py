@@ -151,10 +151,7 @@ def _add_bind_pose(scene: Scene, mesh: int, bones: list[int], joints: Float64Arr
         *[
             record(
                 "PoseNode",
-                children=[
-                    record("Node", number("L", node)),
-                    record("Matrix", array("d", matrix)),
-                ],
+                children=[record("Node", number("L", node)), record("Matrix", array("d", matrix))],
             )
             for node, matrix in places
         ],

@@ -58,11 +58,7 @@ def growth_direction(
 
 
 def internal_direction(
-    cells: CellGraph,
-    wanted: Float32Array,
-    weight: Float32Array,
-    band: Band,
-    options: Options,
+    cells: CellGraph, wanted: Float32Array, weight: Float32Array, band: Band, options: Options
 ) -> Float32Array:
     """Return V (N, 6) of the loose cells: `wanted` by `weight`, and ribbons, diffused."""
     on = band.on

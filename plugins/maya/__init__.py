@@ -118,10 +118,7 @@ def _scene(strands: Strands, space: FileSpace) -> Iterator[bytes]:
     """Yield the groups, each with its curves."""
     assert strands.guide is not None
     assert strands.group is not None
-    for kind, top, chosen in (
-        ("guide", "guides", strands.guide),
-        ("hair", "hair", ~strands.guide),
-    ):
+    for kind, top, chosen in (("guide", "guides", strands.guide), ("hair", "hair", ~strands.guide)):
         groups = np.unique(strands.group[chosen])
         for group in groups.tolist():
             # letters, digits and underscores, as Maya's names are

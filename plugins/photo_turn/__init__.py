@@ -98,10 +98,7 @@ def find_turn(capture: Capture, faces: tuple[Face, ...], persons: tuple[Person, 
 
 
 def _tell(
-    views: Sequence[View],
-    found: Found,
-    canonical: Int64Array,
-    twins: Sequence[tuple[int, int]],
+    views: Sequence[View], found: Found, canonical: Int64Array, twins: Sequence[tuple[int, int]]
 ) -> Turnaround:
     """Return an arrangement of views in canonical order as one of the views."""
     order = in_turn_order(found)

@@ -88,10 +88,7 @@ def _number_twins(names: list[str], order: Int64Array) -> list[str]:
 
 
 def summarise(
-    views: Sequence[View],
-    found: Found,
-    names: Sequence[str],
-    twins: Sequence[tuple[int, int]],
+    views: Sequence[View], found: Found, names: Sequence[str], twins: Sequence[tuple[int, int]]
 ) -> str:
     """Return one line: direction, steps, margin, and everything that is unusual."""
     ring = found.azimuth_deg[~found.above]

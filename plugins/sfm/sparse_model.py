@@ -52,10 +52,7 @@ class Model:
 
 
 def solve(
-    views: Sequence[View],
-    masks: Sequence[Mask],
-    settings: tuple[int, int],
-    seconds: float,
+    views: Sequence[View], masks: Sequence[Mask], settings: tuple[int, int], seconds: float
 ) -> Model:
     """Return the model of photos in the order of the turn.
 

@@ -92,11 +92,7 @@ class Neighbours:
 
 @compiled
 def gather(
-    points: Float64Array,
-    cells: Cells,
-    corners: Float64Array,
-    floor: float,
-    result: Float64Array,
+    points: Float64Array, cells: Cells, corners: Float64Array, floor: float, result: Float64Array
 ) -> None:
     """Write density, mean velocity and the direction of falling density at the points."""
     for p in range(len(points)):
