@@ -7,17 +7,19 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import json
 import math
 import os
 import secrets
 import stat
 import threading
 import tokenize
+import tomllib
 import types
 import typing
 import zipfile
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, BinaryIO, Self
 
@@ -170,6 +172,15 @@ def open_file(path: str | os.PathLike[str]) -> BinaryIO:
         raise InputError(f"{path}: cannot be read ({reason})") from error
 
 
+def file_state(path: str | os.PathLike[str]) -> tuple[int, int, int] | None:
+    """Return inode, size and time, which writing changes; None where there is no file."""
+    try:
+        found = os.stat(path)
+    except OSError:
+        return None
+    return found.st_ino, found.st_size, found.st_mtime_ns
+
+
 def read_bytes(path: str | os.PathLike[str], limit: int = MAX_FILE_BYTES) -> bytes:
     """Return a file's bytes; `InputError` where `open_file` raises it, or above `limit` bytes."""
     with open_file(path) as file:
@@ -190,6 +201,28 @@ def read_text(path: str | os.PathLike[str], limit: int = MAX_FILE_BYTES) -> str:
         raise FormatError(
             f"{path}: not UTF-8 text ({error.reason} at byte {error.start})"
         ) from error
+
+
+def read_toml(path: str | os.PathLike[str], limit: int = MAX_FILE_BYTES) -> dict[str, Any]:
+    """Return the tables of a TOML file; `InputError` when it is none, or as `read_text`."""
+    try:
+        return tomllib.loads(read_text(path, limit))
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: not a TOML file: {error}") from error
+
+
+def toml_value(value: object) -> str:
+    """Return a text, a path, a number, a list or a table of these as TOML writes it.
+
+    >>> toml_value({"size": (1, 2.5), "on": True})
+    '{"size" = [1, 2.5], "on" = true}'
+    """
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(map(toml_value, value))}]"
+    if isinstance(value, Mapping):
+        pairs = [f"{json.dumps(key)} = {toml_value(item)}" for key, item in value.items()]
+        return f"{{{', '.join(pairs)}}}"
+    return json.dumps(value, ensure_ascii=False, default=str)
 
 
 def read_npz(path: str | os.PathLike[str]) -> dict[str, npt.NDArray[Any]]:

@@ -28,10 +28,8 @@ structure_tensor.window_sigma = 16.0
 
 from __future__ import annotations
 
-import json
 import math
 import os
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
@@ -42,7 +40,7 @@ import numpy as np
 from hairkit.arrays import Float64Array
 from hairkit.errors import DataError, InputError, OptionError
 from hairkit.options import make_options, option, unknown_name
-from hairkit.storage import read_text, write_text
+from hairkit.storage import read_text, read_toml, toml_value, write_text
 from hairkit.types.chosen import Chosen, ChosenHair
 from hairkit.types.parting import Parting
 
@@ -118,10 +116,7 @@ def read_capture_file(path: Path) -> CaptureFile:
     """Read a `capture.toml`; a missing one says nothing. Raises `InputError` or `OptionError`."""
     if not os.path.lexists(path):
         return CaptureFile(path)
-    try:
-        document = tomllib.loads(read_text(path, _MAX_BYTES))
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: not a TOML file: {error}") from error
+    document = read_toml(path, _MAX_BYTES)
     keys = [field.name for field in fields(_Top)] + list(_TABLES)
     for key in document:
         if key not in keys:
@@ -148,7 +143,7 @@ def write_table(path: Path, name: str, values: Mapping[str, object]) -> None:
 
     Values of None are left out; a table without any goes, and so does an empty file.
     """
-    said = [f"{key} = {_toml(value)}" for key, value in values.items() if value is not None]
+    said = [f"{key} = {toml_value(value)}" for key, value in values.items() if value is not None]
     _write_lines(path, _lines_without(path, f"[{name}]"), [f"[{name}]", *said] if said else [])
 
 
@@ -162,15 +157,8 @@ def write_view_entries(path: Path, entries: Sequence[ViewEntry]) -> None:
     for entry in entries:
         said = [(f.name, getattr(entry, f.name), f.default) for f in fields(entry)]
         tables += [*([""] if tables else []), "[[views]]"]
-        tables += [f"{name} = {_toml(value)}" for name, value, usual in said if value != usual]
+        tables += [f"{name} = {toml_value(value)}" for name, value, usual in said if value != usual]
     _write_lines(path, kept, tables)
-
-
-def _toml(value: object) -> str:
-    """Return a text, a number or a list of numbers as TOML writes it."""
-    if isinstance(value, tuple):
-        return "[" + ", ".join(map(repr, value)) + "]"
-    return json.dumps(value, ensure_ascii=False)
 
 
 def _write_lines(path: Path, kept: list[str], added: list[str]) -> None:

@@ -9,18 +9,16 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from hairkit.errors import DataError
 from hairkit.stages import OF_HOOK
+from hairkit.storage import file_state
 from hairkit.types.capture import Capture
 from hairkit.types.groom import Groom
-from hairkit.types.mask import Mask, Masks
-from hairkit.types.orientation import OrientationMap
-from hairkit.types.person import Person
+from hairkit.types.mask import Masks
 from hairkit.types.scene import Scene
 from hairkit.types.skin import Texture
 from hairkit.types.strands import Strands
@@ -47,14 +45,14 @@ class Call:
     def of(cls, arguments: Mapping[str, Any]) -> Call:
         """Return the call that is about to be made."""
         path = arguments.get("path")
-        state = None if path is None else _file_state(path)
+        state = None if path is None else file_state(path)
         fresh = state is not None and time.time() - state[2] / 1e9 < CLOCK_STEP_S
         return cls(arguments, state, fresh)
 
     def remove_half_file(self) -> None:
         """Remove what an export that failed has left under the name of its file, not an old one."""
         path = self.arguments["path"]
-        if path.is_file() and _file_state(path) != self.before:
+        if path.is_file() and file_state(path) != self.before:
             path.unlink()
 
 
@@ -84,12 +82,13 @@ def _views_have_names_of_their_own(capture: Capture, call: Call) -> None:
         raise DataError(f"two views have the name {twice!r}, expected each its own")
 
 
-def _mask_has_photo_size(mask: Mask, call: Call) -> None:
-    _check_size("mask", mask.labels.shape, call.arguments["view"])
+def _has_photo_size(what: str, field: str) -> Check:
+    """Return the check that a picture of a result is as large as the photo."""
 
+    def check(result: Any, call: Call) -> None:
+        _check_size(what, getattr(result, field).shape, call.arguments["view"])
 
-def _person_has_photo_size(person: Person, call: Call) -> None:
-    _check_size("person", person.alpha.shape, call.arguments["view"])
+    return check
 
 
 def _turn_has_each_photo(turn: Turnaround, call: Call) -> None:
@@ -104,10 +103,6 @@ def _masks_have_photo_sizes(masks: Masks, call: Call) -> None:
         raise DataError(f"{len(masks.views)} masks, expected one for each of {len(views)} views")
     for view, mask in zip(views, masks.views, strict=True):
         _check_size(f"mask of view {view.name!r}", mask.labels.shape, view)
-
-
-def _angles_have_photo_size(orientation: OrientationMap, call: Call) -> None:
-    _check_size("orientation map", orientation.angle.shape, call.arguments["view"])
 
 
 def _check_size(what: str, shape: tuple[int, ...], view: Any) -> None:
@@ -227,31 +222,22 @@ def _wrote_the_file(written: bool, call: Call) -> None:
         raise DataError("no file was written")
     if not path.stat().st_size:
         raise DataError("the file that was written is empty")
-    if call.before is not None and not call.fresh and _file_state(path) == call.before:
+    if call.before is not None and not call.fresh and file_state(path) == call.before:
         raise DataError("nothing was written; the file there is an older one")
-
-
-def _file_state(path: Path) -> tuple[int, int, int] | None:
-    """Return inode, size and time, which writing changes; None where there is no file."""
-    try:
-        found = path.stat()
-    except OSError:
-        return None
-    return found.st_ino, found.st_size, found.st_mtime_ns
 
 
 Check = Callable[[Any, Call], None]
 
 CHECKS: dict[str, tuple[Check, ...]] = {
     "capture": (_photos_are_scaled, _views_have_names_of_their_own),
-    "segment_person": (_person_has_photo_size,),
+    "segment_person": (_has_photo_size("person", "alpha"),),
     "find_turn": (_turn_has_each_photo,),
-    "segment": (_mask_has_photo_size,),
+    "segment": (_has_photo_size("mask", "labels"),),
     "estimate_scene": (_scene_has_a_camera_per_photo,),
     "refine_masks": (_masks_have_photo_sizes,),
     "fit_head": (_scene_has_a_camera_per_photo, _head_keeps_its_mesh),
     "enhance_texture": (_texture_keeps_its_shape,),
-    "orient": (_angles_have_photo_size,),
+    "orient": (_has_photo_size("orientation map", "angle"),),
     "solve_field": (_field_is_on_the_hull,),
     "track": (_a_strand_starts_at_each_root,),
     "edit_groom": (_groom_has_hair_on_its_head,),

@@ -21,6 +21,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+from hairkit.storage import file_state
+
 FRONT_DOOR = "hairkit"
 """This package loads its names lazily: each stands for the module that defines it."""
 
@@ -79,7 +81,7 @@ def module_digest(module: str, roots: Roots | None = None) -> str:
     for name, path in found:
         digest.update(f"{name} {_read(path).digest}\n".encode())
     for file in data:
-        digest.update(f"{file.name} {_content_digest(file, *_state(file))}\n".encode())
+        digest.update(f"{file.name} {_content_digest(file, file_state(file))}\n".encode())
     known = _DIGESTS[key] = _Known(files, states, digest.hexdigest())
     return known.digest
 
@@ -88,24 +90,18 @@ class _Known(NamedTuple):
     """A digest, and the files that it holds for as long as they do not change."""
 
     files: tuple[Path, ...]
-    states: list[tuple[int, int]]
+    states: list[_State]
     digest: str
 
 
 _DIGESTS: dict[tuple[object, ...], _Known] = {}
 
 
-def _states(files: Iterable[Path]) -> list[tuple[int, int]]:
-    """Return time and size of files; -1 of those that are gone."""
-    return [_state(file) for file in files]
+_State = tuple[int, int, int] | None
 
 
-def _state(file: Path) -> tuple[int, int]:
-    try:
-        state = file.stat()
-    except OSError:
-        return -1, -1
-    return state.st_mtime_ns, state.st_size
+def _states(files: Iterable[Path]) -> list[_State]:
+    return [file_state(file) for file in files]
 
 
 def imported_modules(module: str, roots: Roots | None = None) -> dict[str, Path]:
@@ -129,8 +125,8 @@ def _data_beside(path: Path) -> list[Path]:
 
 
 @functools.cache
-def _content_digest(path: Path, modified: int, size: int) -> str:
-    """Read a file once; `modified` and `size` are there to read it again after a change."""
+def _content_digest(path: Path, state: _State) -> str:
+    """Read a file once; `state` is there to read it again after a change."""
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
@@ -215,13 +211,12 @@ class _Source:
 
 
 def _read(path: Path) -> _Source:
-    state = path.stat()
-    return _parse(path, state.st_mtime_ns, state.st_size)
+    return _parse(path, file_state(path))
 
 
 @functools.cache
-def _parse(path: Path, modified: int, size: int) -> _Source:
-    """Read a file once; `modified` and `size` are there to read it again after a change."""
+def _parse(path: Path, state: _State) -> _Source:
+    """Read a file once; `state` is there to read it again after a change."""
     data = path.read_bytes()
     text = data.decode(errors="replace").replace("\r\n", "\n").replace("\\\n", " ")
     typing = [inner for _, inner in _FOR_TYPES.findall(text)]

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import json
 import os
-import tomllib
 from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -15,7 +14,7 @@ from typing import Any
 
 from hairkit.errors import InputError
 from hairkit.options import unknown_name
-from hairkit.storage import read_text, write_text
+from hairkit.storage import read_toml, toml_value, write_text
 
 Preset = dict[str, Any]
 
@@ -29,10 +28,7 @@ def read_presets(path: Path) -> dict[str, Preset]:
     """Return presets by name; empty if the file does not exist."""
     if not os.path.lexists(path):
         return {}
-    try:
-        document = tomllib.loads(read_text(path))
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: not a TOML file: {error}") from error
+    document = read_toml(path)
     for name, table in document.items():
         if not isinstance(table, Mapping):
             raise InputError(f"{path}: {name!r} is not a table; start it with [{name}]")
@@ -66,17 +62,6 @@ def write_preset(path: Path, name: str, preset: Mapping[str, Any]) -> None:
     lines = []
     for title, table in presets.items():
         lines += [f"[{json.dumps(title)}]"]
-        lines += [f"{json.dumps(key)} = {_toml(value)}" for key, value in table.items()]
+        lines += [f"{json.dumps(key)} = {toml_value(value)}" for key, value in table.items()]
         lines += [""]
     write_text(path, "\n".join(lines))
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, (list, tuple)):
-        return f"[{', '.join(_toml(item) for item in value)}]"
-    if isinstance(value, Mapping):
-        pairs = ", ".join(f"{json.dumps(key)} = {_toml(item)}" for key, item in value.items())
-        return f"{{{pairs}}}"
-    if isinstance(value, float):
-        return repr(value)
-    return json.dumps(value if isinstance(value, (bool, int)) else str(value))

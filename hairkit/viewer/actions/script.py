@@ -16,7 +16,6 @@ file = "windy.png"         # relative to --out
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,7 +23,7 @@ from typing import Any
 
 from hairkit.errors import HairkitError, InputError
 from hairkit.options import make_options, option
-from hairkit.storage import read_text
+from hairkit.storage import read_toml
 from hairkit.viewer.actions.actions import check_values, perform
 from hairkit.viewer.preview import Preview
 from hairkit.viewer.recording import FRAMES_PER_SECOND, Recorder
@@ -55,10 +54,7 @@ class Script:
 
 def read_script(path: Path) -> Script:
     """Read a script; raises `InputError` or `OptionError` that names the invalid step."""
-    try:
-        document = tomllib.loads(read_text(path))
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: not a TOML file: {error}") from error
+    document = read_toml(path)
     steps = document.pop("steps", [])
     if not isinstance(steps, list) or not all(isinstance(step, Mapping) for step in steps):
         raise InputError(f"{path}: steps is not a list of tables; start each step with [[steps]]")

@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from importlib import resources
 from pathlib import Path
 
+from hairkit.storage import file_state
+
 POLL_INTERVAL = 0.5
 """Seconds between two checks."""
 
@@ -27,19 +29,11 @@ class FileWatcher:
         differ, self._seen = states != self._seen, states
         return differ
 
-    def _states(self) -> list[tuple[int, int] | None]:
-        return [_state(path) for path in self._paths]
+    def _states(self) -> list[tuple[int, int, int] | None]:
+        return [file_state(path) for path in self._paths]
 
 
 def shader_files() -> list[Path]:
     """Return the shader files; empty if the package is not a folder."""
     folder = Path(str(resources.files("hairkit_shaders")))
     return sorted(folder.glob("*.*")) if folder.is_dir() else []
-
-
-def _state(path: Path) -> tuple[int, int] | None:
-    try:
-        stat = path.stat()
-    except OSError:
-        return None
-    return stat.st_mtime_ns, stat.st_size
