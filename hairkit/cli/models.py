@@ -5,12 +5,11 @@ from __future__ import annotations
 import argparse
 import json
 from dataclasses import asdict
-from typing import Any
 
 from hairkit.cli.arguments import Add, add_shared
 from hairkit.errors import InputError
 from hairkit.nets.install import install_models, is_intact
-from hairkit.nets.known_models import KNOWN_MODELS, KnownModel
+from hairkit.nets.known_models import KNOWN_MODELS
 from hairkit.nets.model_folder import VARIABLE, model_folder
 
 DESCRIPTION = f"""\
@@ -36,15 +35,12 @@ def run(args: argparse.Namespace) -> int:
     if args.action == "list":
         if args.names or args.source:
             raise InputError("hairkit models list takes no name and no --from; say install")
-        print(json.dumps([_facts(m) for m in KNOWN_MODELS], indent=1) if args.json else _table())
+        facts = [{**asdict(m), "file": m.file, "installed": is_intact(m)} for m in KNOWN_MODELS]
+        print(json.dumps(facts, indent=1) if args.json else _table())
         return 0
     paths = [str(path) for path in install_models(args.names, args.source)]
     print(json.dumps(paths, indent=1) if args.json else "\n".join(paths))
     return 0
-
-
-def _facts(model: KnownModel) -> dict[str, Any]:
-    return {**asdict(model), "installed": is_intact(model)}
 
 
 def _table() -> str:

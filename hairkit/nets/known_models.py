@@ -33,8 +33,6 @@ class KnownModel:
 
     name: str
     purpose: str
-    file: str
-    """Name of the file in the folder of models."""
     sha256: str
     size: int
     """Bytes."""
@@ -42,6 +40,11 @@ class KnownModel:
     package: Package
     member: str
     """Path of the file in the package."""
+
+    @property
+    def file(self) -> str:
+        """Name of the file in the folder of models."""
+        return self.member.rpartition("/")[2]
 
 
 _MEDIAPIPE = Package(
@@ -72,7 +75,6 @@ KNOWN_MODELS = (
     KnownModel(
         "face_detection_short_range",
         "finds faces that fill a good part of the photo",
-        "face_detection_short_range.tflite",
         "bbff11cebd1eb27a1e004cae0b0e63ec8c551cbf34a4451148b4908b8db3eca8",
         229_714,
         _LICENCE,
@@ -82,7 +84,6 @@ KNOWN_MODELS = (
     KnownModel(
         "face_detection_full_range",
         "finds faces up to 5 m away",
-        "face_detection_full_range.tflite",
         "99bf9494d84f50acc6617d89873f71bf6635a841ea699c17cb3377f9507cfec3",
         1_083_984,
         _LICENCE,
@@ -92,7 +93,6 @@ KNOWN_MODELS = (
     KnownModel(
         "face_landmark",
         "mesh of 468 points on a face",
-        "face_landmark.tflite",
         "1055cb9d4a9ca8b8c688902a3a5194311138ba256bcc94e336d8373a5f30c814",
         1_242_398,
         _LICENCE,
@@ -102,7 +102,6 @@ KNOWN_MODELS = (
     KnownModel(
         "selfie_segmentation",
         "tells a person from the background",
-        "selfie_segmentation.tflite",
         "9ee168ec7c8f2a16c56fe8e1cfbc514974cbbb7e434051b455635f1bd1462f5c",
         249_505,
         _LICENCE,
@@ -112,7 +111,6 @@ KNOWN_MODELS = (
     KnownModel(
         "selfie_multiclass",
         "tells hair, skin and clothes from the background",
-        "selfie_multiclass_256x256.tflite",
         "c6748b1253a99067ef71f7e26ca71096cd449baefa8f101900ea23016507e0e0",
         16_371_837,
         _LICENCE,

@@ -25,7 +25,6 @@ WHEEL = Package("nets", "1.0", "0" * 64, 1, ("3.11", "none", "any"))
 MODEL = KnownModel(
     "eyes",
     "finds eyes",
-    "eyes.tflite",
     hashlib.sha256(CONTENT).hexdigest(),
     len(CONTENT),
     "Apache-2.0",
