@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import re
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -127,13 +126,7 @@ def _scene_camera(path: Path, view: str | None, size: str | None) -> Camera:
     if wanted not in names:
         raise InputError(f"{path} has no view {wanted!r}; it has {', '.join(names)}")
     camera = cameras[names.index(wanted)]
-    if size is None:
-        return camera
-    width, height = parse_size(size)
-    scale = min(width / camera.width, height / camera.height)
-    fitted = camera.resized(round(camera.width * scale), round(camera.height * scale))
-    shift = (np.array([width, height]) - [fitted.width, fitted.height]) / 2
-    return replace(fitted, centre=fitted.centre + shift, width=width, height=height)
+    return camera if size is None else camera.fitted(*parse_size(size))
 
 
 def _direction(text: str) -> tuple[float, float]:

@@ -157,6 +157,13 @@ class Camera(Stored):
             self, focal=self.focal * scale, centre=self.centre * size, width=width, height=height
         )
 
+    def fitted(self, width: int, height: int) -> Camera:
+        """Return the camera for a picture of another aspect, in which the whole photo is shown."""
+        scale = min(width / self.width, height / self.height)
+        spare = np.array([width - self.width * scale, height - self.height * scale]) / 2
+        centre = self.centre * scale + spare
+        return replace(self, focal=self.focal * scale, centre=centre, width=width, height=height)
+
     def mirrored(self) -> Camera:
         """Return the camera that sees what is mirrored at the plane x = 0 in the mirrored picture.
 

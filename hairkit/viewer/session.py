@@ -205,7 +205,7 @@ class Session:
         width, height = size or self.size
         through, free = self.shown.through, self._free(width)
         if through is not None and through in self.layers.cameras:
-            return replace(fit_camera(self.layers.cameras[through], free, height), width=width)
+            return replace(self.layers.cameras[through].fitted(free, height), width=width)
         return self.view.camera(width, height, free)
 
     def _free(self, width: int) -> int:
@@ -303,14 +303,6 @@ class Session:
     def _make_body(self) -> None:
         hairs = max(self.shown.hairs, len(self._guides.strands))
         self.body = HairBody.of(self._guides, hairs, self._own, self.seed, self._shares)
-
-
-def fit_camera(camera: Camera, width: int, height: int) -> Camera:
-    """Return a photo's camera for a picture of another aspect that shows the whole photo."""
-    scale = min(width / camera.width, height / camera.height)
-    focal, centre = camera.focal * scale, camera.centre * scale
-    spare = np.array([width - camera.width * scale, height - camera.height * scale]) / 2
-    return Camera(camera.camera_from_head, focal, centre + spare, width, height, camera.model)
 
 
 @dataclass(frozen=True, eq=False)
