@@ -58,19 +58,7 @@ class Manager:
         autoload: bool = True,
         only: Collection[str] | None = None,
     ) -> Manager:
-        """Return a manager on which `load` was called."""
-        manager = cls()
-        manager.load(plugin_files, autoload=autoload, only=only)
-        return manager
-
-    def load(
-        self,
-        plugin_files: Sequence[str | os.PathLike[str]] = (),
-        *,
-        autoload: bool = True,
-        only: Collection[str] | None = None,
-    ) -> None:
-        """Load installed plugins, note those of `HAIRKIT_PLUGIN_PATH`, load plugin files.
+        """Return the installed plugins, those of `HAIRKIT_PLUGIN_PATH`, and those of files.
 
         Parameters
         ----------
@@ -88,15 +76,16 @@ class Manager:
         PluginError
             A plugin file cannot be used. Broken installed plugins are only recorded.
         """
-        own_only = not autoload or bool(os.environ.get(DISABLE_AUTOLOAD))
+        manager, own_only = cls(), not autoload or bool(os.environ.get(DISABLE_AUTOLOAD))
         for distribution, version, entry in entry_points():
             wanted = only is None or entry.name in only
             if wanted and (distribution == hookspecs.PROJECT or not own_only):
-                self._load_entry_point(entry, distribution, version)
+                manager._load_entry_point(entry, distribution, version)
         for manifest in () if own_only else find_manifests():
-            self._add_manifest(manifest)
+            manager._add_manifest(manifest)
         for file in plugin_files:
-            self._load_file(Path(file))
+            manager._load_file(Path(file))
+        return manager
 
     def register(
         self, plugin: object, name: str, distribution: str = "this program", version: str = ""

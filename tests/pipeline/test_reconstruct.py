@@ -203,8 +203,7 @@ def test_the_plugins_own_file_is_part_of_the_digest(tmp_path: Path) -> None:
     source = Path(ball_plugin.__file__).read_text()
     for text in (source, source + "\n# edited\n"):
         (tmp_path / "ball_plugin.py").write_text(text)
-        manager = Manager()
-        manager.load([tmp_path / "ball_plugin.py"], autoload=False)
+        manager = Manager.loaded([tmp_path / "ball_plugin.py"], autoload=False)
         recipe = parse_recipe(RECIPE.encode(), "ball", "test")
         reconstruct(
             turn_capture(), tmp_path / "out", recipe, manager,
