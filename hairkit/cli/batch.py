@@ -86,17 +86,9 @@ def settings_of(args: argparse.Namespace) -> Settings:
     """Return the settings that the arguments name."""
     from hairkit.batches.jobs import Settings
 
-    return Settings(
-        args.recipe,
-        tuple(args.set),
-        tuple(args.plugin),
-        args.guides,
-        args.seed,
-        args.max_edge,
-        args.sheet,
-        args.scores,
-        args.drop_work,
-    )
+    same = ("recipe", "guides", "seed", "max_edge", "sheet", "scores", "drop_work")
+    shared = {name: getattr(args, name) for name in same}
+    return Settings(settings=args.set, plugin_files=args.plugin, **shared)
 
 
 def _made(args: argparse.Namespace) -> list[Result]:

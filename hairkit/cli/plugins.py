@@ -23,6 +23,9 @@ options with their defaults and bounds. --check tries it on a made-up head: cont
 texts, time, memory, and whether two calls give the same; exit code 2 where something fails.
 --lock prints the versions of a recipe's plugins, to be put at its end: it then runs with no others.
 --formats prints what each file format carries, as a Markdown table."""
+_INFO_KEYS = ("name", "distribution", "version", "summary", "stages", "notifications", "broken")
+_OPTION_KEYS = ("name", "default", "wanted", "low", "high", "choices", "unit", "doc")
+"""What is told of a plugin and of its options as JSON."""
 
 
 def add_arguments(add: Add) -> None:
@@ -128,28 +131,8 @@ def _format_default(option: OptionInfo) -> str:
 
 def _as_json(infos: list[PluginInfo]) -> str:
     entries = [
-        {
-            "name": info.name,
-            "distribution": info.distribution,
-            "version": info.version,
-            "summary": info.summary,
-            "stages": info.stages,
-            "notifications": info.notifications,
-            "broken": info.broken,
-            "options": [
-                {
-                    "name": option.name,
-                    "default": option.default,
-                    "wanted": option.wanted,
-                    "low": option.low,
-                    "high": option.high,
-                    "choices": option.choices,
-                    "unit": option.unit,
-                    "doc": option.doc,
-                }
-                for option in info.options
-            ],
-        }
+        {key: getattr(info, key) for key in _INFO_KEYS}
+        | {"options": [{key: getattr(each, key) for key in _OPTION_KEYS} for each in info.options]}
         for info in infos
     ]
     return json.dumps(entries, indent=1, default=str)

@@ -108,8 +108,7 @@ def _hairs(session: Session, readings: Readings) -> str:
 def help_lines() -> list[str]:
     """Return the help sheet, lines of `input<TAB>effect`: mouse, then actions with keys."""
     lines = [f"{what}\t{does}" for what, does in MOUSE]
-    placing = "hairkit.viewer.actions.pose"  # listed last, since few users need it
-    for action in sorted(ACTIONS.values(), key=lambda one: one.do.__module__ == placing):
+    for action in ACTIONS.values():
         if action.keys:
             lines.append(f"{keys_label(list(action.keys))}\t{action.doc.removesuffix('.')}")
     return lines
