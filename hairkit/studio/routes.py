@@ -186,19 +186,23 @@ class Routes:
 
     async def _remove(self, request: Request) -> Response:
         shot = self._shot(request)
-        async with self._studio.change:
-            self._studio.project.remove(shot.id)
+        answer = await self._change(partial(self._studio.project.remove, shot.id))
         self._studio.facts.pop(shot.id, None)
-        self._studio.changed()
-        return JSONResponse({})
+        return answer
 
     async def _arrange(self, request: Request) -> Response:
         order = (await receive_json(request)).get("order")
         if not isinstance(order, list) or not all(isinstance(n, int) for n in order):
             raise HTTPException(HTTPStatus.BAD_REQUEST, "expected the numbers of the photos")
+        return await self._change(partial(self._studio.project.arrange, order))
+
+    async def _change(
+        self, change: Callable[[], object], touched: list[str] | None = None
+    ) -> Response:
+        """Change the project, and say so; `touched` as of `Studio.changed`."""
         async with self._studio.change:
-            self._studio.project.arrange(order)
-        self._studio.changed()
+            change()
+        self._studio.changed(touched=touched)
         return JSONResponse({})
 
     async def _hold(self, request: Request) -> Response:
@@ -234,17 +238,11 @@ class Routes:
         shot, points = self._shot(request), (await receive_json(request)).get("points")
         if points is not None and not _is_points(points):
             raise HTTPException(HTTPStatus.BAD_REQUEST, "expected pairs of numbers")
-        async with self._studio.change:
-            self._studio.project.mark(shot.id, points)
-        self._studio.changed()
-        return JSONResponse({})
+        return await self._change(partial(self._studio.project.mark, shot.id, points))
 
     async def _place_head(self, request: Request) -> Response:
         entry = make_options(HeadEntry, await receive_json(request), "head")
-        async with self._studio.change:
-            self._studio.project.place_head(entry)
-        self._studio.changed(touched=[])
-        return JSONResponse({})
+        return await self._change(partial(self._studio.project.place_head, entry), [])
 
     async def _pose(self, request: Request) -> Response:
         return JSONResponse(await self._studio.editor.call("pose", PHOTO_S, self._placed()))
@@ -268,10 +266,8 @@ class Routes:
     async def _tone(self, request: Request) -> Response:
         shot = self._shot(request)
         tone = make_options(Tone, await receive_json(request), "photo")
-        async with self._studio.change:
-            self._studio.project.tone(shot.id, tone.brightness, tone.contrast)
-        self._studio.changed(touched=[shot.file])
-        return JSONResponse({})
+        change = partial(self._studio.project.tone, shot.id, tone.brightness, tone.contrast)
+        return await self._change(change, [shot.file])
 
     async def _strands(self, request: Request) -> Response:
         """Draw the strands of a photo with options that need not be kept."""
@@ -298,10 +294,7 @@ class Routes:
     async def _edit(self, request: Request) -> Response:
         """Keep the strokes over the hair: all of them, so that undoing one is leaving it out."""
         edits = Edits.of((await receive_json(request)).get("strokes"), "edits")
-        async with self._studio.change:
-            self._studio.project.edit(edits)
-        self._studio.changed(touched=[EDITS])
-        return JSONResponse({})
+        return await self._change(partial(self._studio.project.edit, edits), [EDITS])
 
     async def _stroke(self, request: Request) -> Response:
         """Say what a stroke that is being drawn does to the page's guides."""
@@ -319,11 +312,9 @@ class Routes:
         if not all(isinstance(value, dict) for value in values.values()):
             raise HTTPException(HTTPStatus.BAD_REQUEST, "expected options and hair")
         found = await self._studio.editor.call("check", PHOTO_S, values)
-        async with self._studio.change:
-            hair = make_options(ChosenHair, found["hair"], "hair")
-            self._studio.project.choose(found["plugin"], found["options"], hair)
-        self._studio.changed()
-        return JSONResponse({})
+        hair = make_options(ChosenHair, found["hair"], "hair")
+        choose = self._studio.project.choose
+        return await self._change(partial(choose, found["plugin"], found["options"], hair))
 
     async def _build(self, request: Request) -> Response:
         if not self._studio.project.enough:
