@@ -174,48 +174,31 @@ def _draw_view(imgui: Any, session: Session, perform: Perform) -> None:
     looks = [(name, "look", {"name": name}) for name in LOOKS]
     _buttons(imgui, perform, *looks, ("all", "frame", {}))
     shown = session.shown
-    changed, place = imgui.combo("colours", COLOURINGS.index(shown.colours), list(COLOURINGS))
-    if changed:
-        perform("colours", {"by": COLOURINGS[place]})
-    changed, only = imgui.checkbox("guides only", shown.guides_only)
-    if changed:
-        perform("guides", {"only": only})
-    changed, count = imgui.slider_int("hairs", shown.hairs, *HAIRS)
+    _pick(imgui, perform, "colours", "by", [*COLOURINGS], shown.colours)
+    _set(perform, "guides", "only", imgui.checkbox("guides only", shown.guides_only))
+    _set(perform, "hairs", "count", imgui.slider_int("hairs", shown.hairs, *HAIRS))
     _hint(imgui, "Strands drawn, including guides; lowered if frames take too long.")
-    if changed:
-        perform("hairs", {"count": count})
-    changed, value = imgui.slider_float("exposure", shown.exposure, *EXPOSURES)
-    if changed:
-        perform("exposure", {"value": value})
+    slider = imgui.slider_float
+    _set(perform, "exposure", "value", slider("exposure", shown.exposure, *EXPOSURES))
     _draw_scene(imgui, session, perform)
     if shown.layers & set(BILLBOARDS):
-        changed, value = imgui.slider_float("opacity", shown.opacity, 0.0, 1.0)
+        _set(perform, "opacity", "value", slider("opacity", shown.opacity, 0.0, 1.0))
         _hint(imgui, "Opacity of the photos.")
-        if changed:
-            perform("opacity", {"value": value})
     for name in session.layers.available:
-        changed, on = imgui.checkbox(name, name in shown.layers)
-        if changed:
-            perform("layer", {"name": name, "on": on})
+        _set(perform, "layer", "on", imgui.checkbox(name, name in shown.layers), name=name)
 
 
 def _draw_scene(imgui: Any, session: Session, perform: Perform) -> None:
-    shown, names = session.shown, list(BACKDROPS)
-    changed, value = imgui.slider_float("light", shown.light, -180.0, 180.0, "%.0f deg")
+    shown, slider = session.shown, imgui.slider_float
+    _set(perform, "light", "degrees", slider("light", shown.light, -180.0, 180.0, "%.0f deg"))
     _hint(imgui, "Turns the lights round the head.")
-    if changed:
-        perform("light", {"degrees": value})
-    changed, place = imgui.combo("backdrop", names.index(shown.backdrop), names)
-    if changed:
-        perform("backdrop", {"name": names[place]})
-    changed, value = imgui.slider_float("lens", 1e3 * shown.aperture, 0.0, LENSES, "%.0f mm")
+    _pick(imgui, perform, "backdrop", "name", [*BACKDROPS], shown.backdrop)
+    opening = slider("lens", 1e3 * shown.aperture, 0.0, LENSES, "%.0f mm")
+    _set(perform, "lens", "aperture", opening)
     _hint(imgui, "Diameter of the lens: depth of field while nothing moves.")
-    if changed:
-        perform("lens", {"aperture": value})
     if "photos" in session.layers.available:
-        changed, on = imgui.checkbox("photo beside the hair", shown.wipe is not None)
-        if changed:
-            perform("wipe", {"on": on})
+        found = imgui.checkbox("photo beside the hair", shown.wipe is not None)
+        _set(perform, "wipe", "on", found)
 
 
 def _draw_presets(imgui: Any, session: Session, name: str, perform: Perform) -> str:
@@ -236,14 +219,11 @@ def _draw_presets(imgui: Any, session: Session, name: str, perform: Perform) -> 
 
 def _draw_wind_and_head(imgui: Any, session: Session, perform: Perform) -> None:
     air = session.wind
-    changed, on = imgui.checkbox("wind", air.blowing)
-    if changed:
-        perform("wind", {"on": on})
+    _set(perform, "wind", "on", imgui.checkbox("wind", air.blowing))
     for name, low, high, shape, hint in WIND_RANGES:
-        changed, value = imgui.slider_float(name, float(getattr(air, name)), low, high, shape)
+        found = imgui.slider_float(name, float(getattr(air, name)), low, high, shape)
+        _set(perform, "wind", name, found, on=air.blowing)
         _hint(imgui, hint)
-        if changed:
-            perform("wind", {"on": air.blowing, name: value})
     _buttons(
         imgui,
         perform,
@@ -257,9 +237,7 @@ def _draw_wind_and_head(imgui: Any, session: Session, perform: Perform) -> None:
 
 def _draw_brush(imgui: Any, now: Brushing | None, perform: Perform) -> None:
     taken = NAMES[0] if now is None else now.setting.brush
-    changed, place = imgui.combo("brush", NAMES.index(taken), list(NAMES))
-    if changed:
-        perform("brush", {"name": NAMES[place]})
+    _pick(imgui, perform, "brush", "name", [*NAMES], taken)
     if now is not None:
         for info in describe(Brush)[1:]:
             _draw_option(imgui, info, getattr(now.setting, info.name), "brush_option", perform)
@@ -295,6 +273,19 @@ def _draw_option(imgui: Any, info: OptionInfo, value: Any, action: str, perform:
     _hint(imgui, info.doc)
     if changed:
         perform(action, {"name": info.name, "value": value})
+
+
+def _set(perform: Perform, action: str, key: str, found: Any, **more: object) -> None:
+    """Perform an action with the value of a control that was changed."""
+    changed, value = found
+    if changed:
+        perform(action, {**more, key: value})
+
+
+def _pick(imgui: Any, perform: Perform, action: str, key: str, names: list[str], now: str) -> None:
+    """Draw the list of an action's names."""
+    changed, place = imgui.combo(action, names.index(now), names)
+    _set(perform, action, key, (changed, names[place]))
 
 
 def _buttons(imgui: Any, perform: Perform, *row: tuple[str, str, Mapping[str, object]]) -> None:
