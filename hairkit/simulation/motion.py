@@ -6,7 +6,9 @@ import json
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -71,7 +73,6 @@ class HeadMotion:
                 f" {RIGID_TOLERANCE:g};"
                 " remove scale and shear"
             )
-        object.__setattr__(self, "_turns", _align_signs(quaternion.from_matrix(turn)))
         freeze(self, "pivot", np.float64, (3,), "motion pivot")
 
     def __call__(self, time: float) -> Float64Array:
@@ -88,34 +89,48 @@ class HeadMotion:
 
     def _interpolate_keys(self, time: float) -> Float64Array:
         """Interpolate rotations and translations by a non-uniform Catmull-Rom spline."""
-        count = len(self.times)
-        if count == 1 or time <= self.times[0]:
+        if len(self.times) == 1 or time <= self.times[0]:
             return np.array(self.keys[0])
         if time >= self.times[-1]:
             return np.array(self.keys[-1])
-        at = int(np.searchsorted(self.times, time, side="right")) - 1
-        span = self.times[at + 1] - self.times[at]
-        share = (time - self.times[at]) / span
-        turns: Float64Array = self.__dict__["_turns"]
-        values = np.concatenate([turns, self.keys[:, :3, 3]], axis=1)
-        slopes = [_key_slope(self.times, values, k) * span for k in (at, at + 1)]
-        mixed = _hermite(values[at], slopes[0], values[at + 1], slopes[1], share)
+        mixed = self._spline(time)
         motion = np.eye(4)
         motion[:3, :3] = quaternion.to_matrix(quaternion.normalize(mixed[:4]))
         motion[:3, 3] = mixed[4:]
         return motion
 
+    @cached_property
+    def _spline(self) -> Any:
+        """Quaternion and place (7,) of the head at a time."""
+        from scipy.interpolate import CubicHermiteSpline  # slow to load
+
+        turns = _align_signs(quaternion.from_matrix(self.keys[:, :3, :3]))
+        values = np.concatenate([turns, self.keys[:, :3, 3]], axis=1)
+        key = np.arange(len(values))
+        low, high = np.maximum(key - 1, 0), np.minimum(key + 1, key[-1])
+        slopes = (values[high] - values[low]) / (self.times[high] - self.times[low])[:, None]
+        return CubicHermiteSpline(self.times, values, slopes)
+
     def _shake_transform(self, time: float) -> Float64Array:
-        turn = np.eye(3)
+        turns = []
         for shake in self.shakes:
             angle = np.radians(shake.degrees) * np.sin(2 * np.pi * shake.hertz * time)
-            angle *= _ease_in_out(time, shake.until)
-            turn = turn @ quaternion.to_matrix(quaternion.from_axis(AXES[shake.axis], angle))
-        motion = np.eye(4)
-        motion[:3, :3] = turn
-        if self.pivot is not None:
-            motion[:3, 3] = self.pivot - turn @ self.pivot
-        return motion
+            turns.append((shake.axis, float(angle * _ease_in_out(time, shake.until))))
+        return turn_about(np.zeros(3) if self.pivot is None else self.pivot, *turns)
+
+
+def turn_about(pivot: Float64Array, *turns: tuple[str, float]) -> Float64Array:
+    """Return the rotation (4, 4) by angles, radians, about axes through a point (3,), last first.
+
+    Yaw turns to the subject's left, pitch nods down, roll tilts to the right shoulder.
+    """
+    motion = np.eye(4)
+    for axis, angle in turns:
+        motion[:3, :3] = motion[:3, :3] @ quaternion.to_matrix(
+            quaternion.from_axis(AXES[axis], angle)
+        )
+    motion[:3, 3] = pivot - motion[:3, :3] @ pivot
+    return motion
 
 
 def static_motion() -> HeadMotion:
@@ -195,10 +210,7 @@ def _read_json(path: Path) -> HeadMotion:
 def _parse_key(frame: dict[str, object]) -> Float64Array:
     """Return a key: rotation by pitch, then roll, then yaw, then translation."""
     pitch, yaw, roll = np.radians(np.array(frame.get("turn_deg", (0, 0, 0)), np.float64))
-    key = np.eye(4)
-    turns = [("yaw", yaw), ("roll", roll), ("pitch", pitch)]
-    for name, angle in turns:
-        key[:3, :3] = key[:3, :3] @ quaternion.to_matrix(quaternion.from_axis(AXES[name], angle))
+    key = turn_about(np.zeros(3), ("yaw", yaw), ("roll", roll), ("pitch", pitch))
     key[:3, 3] = np.array(frame.get("move", (0, 0, 0)), np.float64)
     return key
 
@@ -230,16 +242,3 @@ def _align_signs(turns: Float64Array) -> Float64Array:
     sign[sign == 0] = 1.0
     near: Float64Array = turns * np.concatenate([[1.0], np.cumprod(sign)])[:, None]
     return near
-
-
-def _key_slope(times: Float64Array, values: Float64Array, k: int) -> Float64Array:
-    low, high = max(k - 1, 0), min(k + 1, len(times) - 1)
-    result: Float64Array = (values[high] - values[low]) / (times[high] - times[low])
-    return result
-
-
-def _hermite(
-    a: Float64Array, slope_a: Float64Array, b: Float64Array, slope_b: Float64Array, t: float
-) -> Float64Array:
-    one, two = t * t * (3 - 2 * t), t * (1 - t)
-    return a + (b - a) * one + two * ((1 - t) * slope_a - t * slope_b)

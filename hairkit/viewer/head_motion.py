@@ -7,9 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hairkit.arrays import Float64Array
+from hairkit.simulation.motion import AXES, turn_about
 
-AXES = {"yaw": (0.0, 1.0, 0.0), "pitch": (1.0, 0.0, 0.0), "roll": (0.0, 0.0, 1.0)}
-"""Yaw turns to the subject's left, pitch nods down, roll tilts to the right shoulder."""
 MAX_TURN = 2.0
 """Largest angle of the head about each axis, radians."""
 GLIDE = 0.18
@@ -69,20 +68,8 @@ class HeadMotion:
 
     def matrix(self) -> Float64Array:
         """Return head_from_rest (4, 4): roll first, then pitch, then yaw."""
-        result = np.eye(4)
-        for axis in ("roll", "pitch", "yaw"):
-            angle = self._turned[axis] + sum(s.angle() for s in self.shakes if s.axis == axis)
-            result = rotation_about(AXES[axis], angle, self.pivot) @ result
-        return result
-
-
-def rotation_about(
-    axis: tuple[float, float, float], angle: float, pivot: Float64Array
-) -> Float64Array:
-    """Return the (4, 4) rotation by `angle` radians about a unit `axis` through `pivot` (3,)."""
-    x, y, z = axis
-    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    matrix = np.eye(4)
-    matrix[:3, :3] += np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
-    matrix[:3, 3] = pivot - matrix[:3, :3] @ pivot
-    return matrix
+        angles = {
+            axis: turned + sum(shake.angle() for shake in self.shakes if shake.axis == axis)
+            for axis, turned in self._turned.items()
+        }
+        return turn_about(self.pivot, *((axis, angles[axis]) for axis in ("yaw", "pitch", "roll")))

@@ -19,7 +19,7 @@ from hairkit.viewer.actions.presets import presets_path, read_preset, write_pres
 from hairkit.viewer.actions.registry import ACTIONS, action, bindings, check_values, perform
 from hairkit.viewer.draw.colouring import COLOURINGS
 from hairkit.viewer.draw.hair_data import MAX_HAIRS
-from hairkit.viewer.head_motion import AXES, MAX_TURN, Shake
+from hairkit.viewer.head_motion import MAX_TURN, Shake
 from hairkit.viewer.picking import grab_lock, nearest_hair, surface_point
 from hairkit.viewer.recording import Recorder, free_name
 from hairkit.viewer.session import MAX_TURBULENCE, MAX_WIND, Session
@@ -171,8 +171,8 @@ def shake(
     seconds: float = 2.0,
 ) -> None:
     """Shake the head about yaw, pitch or roll."""
-    if axis not in AXES:
-        raise InputError(unknown_name("axis", axis, AXES))
+    if axis not in session.motion.turn:
+        raise InputError(unknown_name("axis", axis, session.motion.turn))
     session.motion.shakes.append(Shake(axis, float(np.radians(degrees)), hertz, seconds))
 
 

@@ -24,6 +24,7 @@ from hairkit.arrays import Float32Array
 from hairkit.head_model.template import default_head
 from hairkit.rendering.context import renderer
 from hairkit.rendering.head import head_solid
+from hairkit.simulation.motion import turn_about
 from hairkit.types.camera import Camera
 from hairkit.viewer.draw import mesh_layer
 from hairkit.viewer.draw.frame import FrameRenderer
@@ -33,7 +34,6 @@ from hairkit.viewer.draw.light_gpu import TURNS
 from hairkit.viewer.draw.lines import LineSet
 from hairkit.viewer.draw.mesh_cpu import SoftSolid
 from hairkit.viewer.draw.meshes import SolidPass
-from hairkit.viewer.head_motion import rotation_about
 
 
 def test_hair_is_drawn_where_the_camera_sees_it_and_nowhere_else(
@@ -104,7 +104,7 @@ def test_a_head_and_its_camera_that_move_together_show_the_same_hair(
     frame_renderer: FrameRenderer,
 ) -> None:
     """Only their relation matters, studio apart: what moves with the head is drawn in its frame."""
-    motion = rotation_about((0.0, 1.0, 0.0), 0.7, np.zeros(3))
+    motion = turn_about(np.zeros(3), ("yaw", 0.7))
     with_head = replace(CAMERA, camera_from_head=CAMERA.camera_from_head @ np.linalg.inv(motion))
     with renderer():
         still, moved = (
@@ -171,7 +171,7 @@ def test_what_stays_is_drawn_again_with_new_light_only(
 
         monkeypatch.setattr(kind, "draw", counted)
         for turn in np.linspace(0.0, 0.3, 2 * TURNS):
-            pose = rotation_about((0, 1, 0), turn, np.zeros(3))
+            pose = turn_about(np.zeros(3), ("yaw", turn))
             turned = inputs(whole_light=False, solids=("torso",), world_from_head=pose)
             kept = picture(frame_renderer, turned)
         assert 2 <= count[0] <= 3
@@ -187,7 +187,7 @@ def upload_torso(frame_renderer: FrameRenderer) -> None:
     frame_renderer.upload_solid("torso", head_solid(below, GROOM.material))
 
 
-NODDED = rotation_about((1, 0, 0), 0.3, np.zeros(3))
+NODDED = turn_about(np.zeros(3), ("pitch", 0.3))
 CHANGES: dict[str, dict[str, Any]] = {
     "camera": {"camera": Camera.on_turn(60.0, distance=0.6, focal=260.0, width=160, height=120)},
     "head": {"world_from_head": NODDED, "solids": ()},
@@ -267,7 +267,7 @@ def test_processor_and_shaders_draw_the_same_meshes(monkeypatch: pytest.MonkeyPa
 def test_the_neck_ends_in_the_collar_of_a_head_that_nods() -> None:
     """Its end goes with the torso, what is above its upper joint with the head, and it is whole."""
     head = default_head()
-    nod = rotation_about((1, 0, 0), 0.4, head.joints[1].astype(np.float64))
+    nod = turn_about(head.joints[1].astype(np.float64), ("pitch", 0.4))
     with renderer() as gl:
         part = SolidPass(gl, head_solid(head, GROOM.material))
         part.place(np.linalg.inv(nod))
