@@ -102,16 +102,16 @@ def _signature(hook: str, sketch: Sketch) -> str:
 
 def _imports(sketch: Sketch, signature: str) -> str:
     """Return the imports of a module: of its method, and of the types that the contract names."""
-    code = "\n".join([*(_ALWAYS if sketch.option else _ALWAYS[:1]), *sketch.imports])
-    contract = _taken(inspect.getsource(hookspecs))
-    words = {*re.findall(r"\w+", signature + sketch.body + sketch.before)}
-    taken = _taken(code) | {name: contract[name] for name in words & contract.keys()}
+    written = f"hookimpl {signature} {sketch.before} {sketch.body}"
+    words = {*re.findall(r"\w+", written + " dataclass option" * bool(sketch.option))}
+    homes = _taken(inspect.getsource(hookspecs)) | _taken(_KNOWN)
     modules = []
-    for module in sorted({*taken.values()}):
-        names = sorted(name for name, home in taken.items() if home == module)
+    for module in sorted({home for name, home in homes.items() if name in words}):
+        names = sorted(name for name, home in homes.items() if home == module and name in words)
         modules.append(f"from {module} import {', '.join(names)}")
     standard = [line for line in modules if not line.startswith(("from hairkit", "from scipy"))]
-    plain = [line for line in code.splitlines() if line.startswith("import")]
+    imported = [line for line in _KNOWN.splitlines() if line.startswith("import")]
+    plain = [line for line in imported if line.split()[-1] in words]
     others = [line for line in modules if line not in standard]
     return "\n".join([*standard, "", *plain, *others]).strip()
 
@@ -122,12 +122,27 @@ def _taken(code: str) -> dict[str, str]:
     return {alias.name: str(node.module) for node in found for alias in node.names}
 
 
-_ALWAYS = (
-    "from hairkit.hookspecs import hookimpl",
-    "from dataclasses import dataclass",
-    "from hairkit.options import option",
-)
-"""Imports of each module; the first is that of a hook without options, too."""
+_KNOWN = """\
+import sys
+import cv2
+import numpy as np
+from dataclasses import dataclass, replace
+from scipy.spatial import cKDTree
+from hairkit.grooming import brushes
+from hairkit.hookspecs import hookimpl
+from hairkit.io.capture_reader import read_folder
+from hairkit.io.file_format import Feature, FileFormat
+from hairkit.options import option
+from hairkit.simulation import Measures, Surroundings
+from hairkit.storage import write_text
+from hairkit.types.camera import Camera
+from hairkit.types.finding import Finding
+from hairkit.types.head import LANDMARKS
+from hairkit.types.mask import HAIR, PERSON
+from hairkit.types.orientation import wrap_angle
+from hairkit.types.volume import VoxelGrid
+"""
+"""What sketches use besides the types of their hooks' signatures."""
 _COMMANDS = {
     "make_simulator": "hairkit simulate out/groom.npz -o cache.npz --using NAME",
     "export_groom": "hairkit export out/groom.npz -o hair.NAME",

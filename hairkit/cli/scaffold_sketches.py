@@ -10,8 +10,6 @@ class Sketch:
     """The simplest method that fulfils a stage's contract, in pieces of source text."""
 
     summary: str
-    imports: tuple[str, ...]
-    """Besides those of the types in the hook's signature."""
     option: str
     """Empty for a hook without options."""
     body: str
@@ -19,12 +17,9 @@ class Sketch:
     """Code between the imports and the options."""
 
 
-_NUMPY = "import numpy as np"
-
 SKETCHES = {
     "capture": Sketch(
         "Captures of an archive, by the names of their folders.",
-        ("from hairkit.io.capture_reader import read_folder",),
         'archive: str = option("", doc="Folder of the archive.")',
         """
 folder = Path(options.archive) / source
@@ -32,7 +27,6 @@ return read_folder(folder, max_edge) if folder.is_dir() else None""",
     ),
     "detect_landmarks": Sketch(
         "A face in the middle of the photo, seen from in front.",
-        (_NUMPY, "from hairkit.types.head import LANDMARKS"),
         'noise: float = option(50.0, low=1.0, high=500.0, doc="Of each landmark.", unit="px")',
         """
 middle = np.tile([view.width / 2, view.height / 2], (LANDMARKS, 1))
@@ -40,7 +34,6 @@ return Face(0.5, middle, np.full(LANDMARKS, options.noise), 0.0, 0.0, 0.0)""",
     ),
     "segment_person": Sketch(
         "All that differs from the picture's upper corner is the person.",
-        (_NUMPY,),
         'gain: float = option(4.0, low=0.1, high=100.0, doc="Opacity for a grey level.")',
         """
 difference = np.abs(view.image.astype(np.float32) - view.image[0, 0]).mean(axis=-1)
@@ -48,7 +41,6 @@ return Person(np.clip(options.gain * difference, 0, 255).astype(np.uint8))""",
     ),
     "find_turn": Sketch(
         "Photos in file order, evenly around the head.",
-        (_NUMPY,),
         'step: float = option(45.0, low=-180.0, high=180.0, doc="To the next.", unit="deg")',
         """
 index = np.arange(len(capture.views))
@@ -58,7 +50,6 @@ return Turnaround(index, azimuth, level, names, np.inf, "turn as numbered")""",
     ),
     "segment": Sketch(
         "Everything dark is hair.",
-        (_NUMPY, "from hairkit.types.mask import HAIR"),
         'threshold: int = option(90, low=1, high=254, doc="Darker pixels are hair.")',
         """
 dark = view.image.mean(axis=-1) < options.threshold
@@ -67,7 +58,6 @@ return Mask(labels, person_known=False) if dark.any() else None""",
     ),
     "estimate_scene": Sketch(
         "The nominal turn: every camera where the capture says, all at one distance.",
-        ("from hairkit.types.camera import Camera",),
         'distance: float = option(0.8, low=0.3, high=5.0, doc="From the head.", unit="m")',
         """
 cameras = tuple(
@@ -84,7 +74,6 @@ return Scene(tuple(view.name for view in capture.views), cameras, head)""",
     ),
     "refine_masks": Sketch(
         "Take specks off the hair.",
-        ("import cv2", _NUMPY, "from hairkit.types.mask import HAIR, PERSON"),
         'radius: int = option(1, low=0, high=50, doc="Of the specks.", unit="px")',
         """
 refined = []
@@ -97,7 +86,6 @@ return Masks(tuple(refined))""",
     ),
     "fit_head": Sketch(
         "Scale the head about its centre.",
-        ("from dataclasses import dataclass, replace",),
         'scale: float = option(1.0, low=0.5, high=2.0, doc="Factor on the head\'s size.")',
         """
 head = replace(scene.head, vertices=scene.head.vertices * options.scale)
@@ -105,7 +93,6 @@ return replace(scene, head=head)""",
     ),
     "enhance_texture": Sketch(
         "More contrast.",
-        (_NUMPY,),
         'gain: float = option(1.2, low=0.1, high=10.0, doc="Of the contrast.")',
         """
 pixels = texture.pixels.astype(np.float32)
@@ -115,7 +102,6 @@ return Texture.encode(np.rint(stronger).astype(np.uint8))""",
     ),
     "orient": Sketch(
         "Strands run across the gradient of brightness.",
-        ("import cv2", _NUMPY, "from hairkit.types.orientation import wrap_angle"),
         'sigma: float = option(2.0, low=0.5, high=20.0, doc="Blur before.", unit="px")',
         """
 grey = cv2.cvtColor(view.image, cv2.COLOR_RGB2GRAY).astype(np.float32)
@@ -127,7 +113,6 @@ return OrientationMap(wrap_angle(angle), strength / max(float(strength.max()), 1
     ),
     "build_hull": Sketch(
         "Cells outside the head that enough views see as hair.",
-        (_NUMPY, "from scipy.spatial import cKDTree", "from hairkit.types.volume import VoxelGrid"),
         'votes: int = option(4, low=1, high=8, doc="Views that must see hair.")',
         """
 head = scene.head
@@ -146,7 +131,6 @@ return Hull(grid, hair, hair, distance)""",
     ),
     "solve_field": Sketch(
         "All hair hangs straight down.",
-        (_NUMPY,),
         'confidence: float = option(1.0, low=0.0, high=1.0, doc="Given to every cell.")',
         """
 tensor = np.zeros((*hull.grid.shape, 6), np.float32)
@@ -156,7 +140,6 @@ return OrientationField(hull.grid, tensor, confidence, np.maximum(hull.head_dist
     ),
     "track": Sketch(
         "Straight bristles along the scalp's normals.",
-        (_NUMPY,),
         'length: float = option(0.05, low=0.001, high=1.0, doc="Of a strand.", unit="m")',
         """
 along = np.linspace(0.0, options.length, 10, dtype=np.float32)[None, :, None]
@@ -166,7 +149,6 @@ return Strands(points.reshape(-1, 3), offsets, root_uv=roots.uv)""",
     ),
     "edit_groom": Sketch(
         "Strokes of hairkit's brushes, and of one that lets hair sink.",
-        (_NUMPY, "from hairkit.grooming import brushes"),
         'drop: float = option(0.01, low=0.0, high=1.0, doc="Of the brush sink.", unit="m")',
         """
 def sink(hair, strokes):
@@ -180,7 +162,6 @@ return brushes.edit_groom(groom, edits, every)""",
     ),
     "make_simulator": Sketch(
         "Hair that goes rigidly with the head.",
-        (_NUMPY, "from hairkit.simulation import Measures, Surroundings"),
         'sink: float = option(0.0, low=0.0, high=1.0, doc="Speed of falling.", unit="m/s")',
         "return Rigid(groom, options)",
         before='''
@@ -219,11 +200,6 @@ class Rigid:
     ),
     "export_groom": Sketch(
         "One text line a point: strand, x, y, z.",
-        (
-            _NUMPY,
-            "from hairkit.io.file_format import Feature, FileFormat",
-            "from hairkit.storage import write_text",
-        ),
         'digits: int = option(6, low=1, high=9, doc="Decimals of a coordinate in metres.")',
         """
 strand = np.repeat(np.arange(len(groom.strands)), groom.strands.counts)
@@ -241,10 +217,6 @@ FORMAT = FileFormat(
     ),
     "import_groom": Sketch(
         "Read the native form and thin it out.",
-        (
-            "from dataclasses import dataclass, replace",
-            "from hairkit.io.file_format import Feature, FileFormat",
-        ),
         'every: int = option(1, low=1, high=1000, doc="Keep one strand of so many.")',
         """
 groom = Groom.load(path)
@@ -265,7 +237,6 @@ FORMAT = FileFormat(
     ),
     "validate_groom": Sketch(
         "Strands must be shorter than the studio's longest wig.",
-        ("from hairkit.types.finding import Finding",),
         "",
         """
 longest = float(groom.strands.lengths().max())
@@ -275,13 +246,11 @@ return [Finding.of("wig-length", longest <= LONGEST, said)]""",
     ),
     "stage_finished": Sketch(
         "Tells when stages end.",
-        ("import sys",),
         "",
         'print(f"{stage} took {seconds:.2f} s", file=sys.stderr)',
     ),
     "groom_ready": Sketch(
         "Tells how much hair a run has made.",
-        ("import sys",),
         "",
         'print(f"{len(groom.strands)} strands", file=sys.stderr)',
     ),
