@@ -15,6 +15,7 @@ from hairkit.types.head import Head
 
 JOINT_NAMES = ("root", "neck", "head")
 """Names of the joints in their order; each is the parent of the next."""
+JOINT_PARENTS = (-1, 0, 1)
 HEAD_JOINT = 2
 """The joint that hair is bound to."""
 _LEAN = np.radians(20.0)

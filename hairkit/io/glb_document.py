@@ -6,13 +6,14 @@ import itertools
 import json
 import struct
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from hairkit.arrays import Float64Array
 from hairkit.io.byte_writer import as_bytes
 from hairkit.io.glb_file import BINARY_CHUNK, JSON_CHUNK
 from hairkit.io.streamed import Streamed
@@ -115,6 +116,30 @@ class Document:
             self.add("samplers", magFilter=9729, minFilter=9987, wrapS=clamp, wrapT=clamp)
         self._pictures[picture] = self.add("textures", source=source, sampler=0)
         return self._pictures[picture]
+
+    def joints(
+        self, names: Sequence[str], places: Float64Array, parents: Sequence[int]
+    ) -> list[int]:
+        """Add nodes of joints at places (J, 3), metres, each after its parent; -1 has none."""
+        nodes: list[int] = []
+        for name, place, parent in zip(names, places, parents, strict=True):
+            offset = place if parent < 0 else place - places[parent]
+            nodes.append(self.add("nodes", name=name, translation=offset.tolist()))
+            if parent >= 0:
+                self.json["nodes"][nodes[parent]].setdefault("children", []).append(nodes[-1])
+        return nodes
+
+    def skin(self, nodes: list[int], places: Float64Array) -> int:
+        """Add a skin of joints at rest at places (J, 3), metres, which all skins share."""
+        if "skins" in self.json:
+            bind: int = self.json["skins"][0]["inverseBindMatrices"]
+        else:
+            matrices = np.tile(np.eye(4, dtype=np.float32), (len(places), 1, 1))
+            matrices[:, 3, :3] = -places  # column-major: the place is in the last row of the array
+            bind = self.accessor(matrices, None)
+        return self.add(
+            "skins", name="skeleton", joints=nodes, skeleton=nodes[0], inverseBindMatrices=bind
+        )
 
     def write(self, path: Path) -> None:
         """Write the .glb file, atomically; equal documents are equal files."""

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hairkit.arrays import Float64Array
-from hairkit.head_model.skinning import HEAD_JOINT, JOINT_NAMES, head_weights
+from hairkit.head_model.skinning import HEAD_JOINT, JOINT_NAMES, JOINT_PARENTS, head_weights
 from hairkit.io.glb_document import Document
 from hairkit.types.groom import Groom
 
@@ -40,7 +40,7 @@ class Skeleton:
 def plain_skeleton(groom: Groom, chains: Chains | None) -> Skeleton:
     """Return the groom's three joints, and the chains on the last."""
     places = groom.head.joints.astype(np.float64)
-    return with_chains(list(JOINT_NAMES), places, [-1, 0, 1], (0, 1, 2), chains)
+    return with_chains(list(JOINT_NAMES), places, list(JOINT_PARENTS), (0, 1, 2), chains)
 
 
 def with_chains(
@@ -73,11 +73,8 @@ class Scenes:
     def level(self, number: int, skeleton: Skeleton, *, head: bool) -> list[int]:
         """Add a scene with one level and a skeleton of its own; return the skeleton's nodes."""
         document, level = self.document, self.cards.levels[number]
-        nodes = self._nodes(skeleton)
-        skin = document.add(
-            "skins", name="skeleton", joints=nodes, skeleton=nodes[0],
-            inverseBindMatrices=self._inverse_bind(skeleton),
-        )  # fmt: skip
+        nodes = document.joints(skeleton.names, skeleton.places, skeleton.parents)
+        skin = document.skin(nodes, skeleton.places)
         name = f"cards_LOD{number}"
         parts = [(name, self._mesh(name, level, skeleton))]
         if head:
@@ -86,21 +83,6 @@ class Scenes:
         document.add("scenes", name=f"LOD{number}", nodes=[nodes[0], *shown])
         document.json["scene"] = 0
         return nodes
-
-    def _nodes(self, skeleton: Skeleton) -> list[int]:
-        document, places = self.document, skeleton.places
-        nodes: list[int] = []
-        for name, place, parent in zip(skeleton.names, places, skeleton.parents, strict=True):
-            offset = place if parent < 0 else place - places[parent]
-            nodes.append(document.add("nodes", name=name, translation=offset.tolist()))
-            if parent >= 0:
-                document.json["nodes"][nodes[parent]].setdefault("children", []).append(nodes[-1])
-        return nodes
-
-    def _inverse_bind(self, skeleton: Skeleton) -> int:
-        matrices = np.tile(np.eye(4, dtype=np.float32), (len(skeleton.places), 1, 1))
-        matrices[:, 3, :3] = -skeleton.places  # column-major
-        return self.document.accessor(matrices, None)
 
     def _mesh(self, name: str, level: Level, skeleton: Skeleton) -> int:
         add = self.document.accessor

@@ -12,6 +12,7 @@ from hairkit.arrays import Float32Array, Float64Array, UInt8Array
 from hairkit.errors import InputError
 from hairkit.grooming.guide_weights import guide_mask
 from hairkit.head_model.bust import CLOTH, Bust
+from hairkit.head_model.skinning import HEAD_JOINT
 from hairkit.io.glb_document import INDICES, Document, index_type
 from hairkit.io.glb_skin import ROUGHNESS_CHANNEL
 from hairkit.io.streamed import Streamed, at_points, repeat_row, segments
@@ -25,8 +26,6 @@ from hairkit.types.strands import Strands
 from .strips import HairMesh
 from .texture import white_picture
 
-JOINTS = ("root", "neck", "head")
-ROOT_JOINT, HEAD_JOINT = JOINTS.index("root"), JOINTS.index("head")
 LINES = 1
 ROUGHNESS = {"hair": 0.45, "guides": 0.6, "cloth": 0.9}
 _SCALP_SHADE = 0.6
@@ -71,7 +70,7 @@ class Meshes:
         attributes = {
             "POSITION": add(bust.vertices, bounds=True),
             "NORMAL": add(bust.normals),
-            **self._skin(count, ROOT_JOINT),
+            **self._skin(count, joint=0),
         }
         primitive = {
             "attributes": attributes,

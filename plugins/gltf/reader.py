@@ -14,6 +14,7 @@ from hairkit.errors import FormatError
 from hairkit.grooming.adopt_strands import ImportOptions, adopt
 from hairkit.grooming.curve_sets import CurveSet, join_sets, strands_of
 from hairkit.head_model.scalp import bind
+from hairkit.head_model.skinning import JOINT_NAMES
 from hairkit.io.glb_file import GlbFile, readable
 from hairkit.io.glb_skin import material_maps, shape_offsets
 from hairkit.io.plain_settings import capsules_of, made, ties_of
@@ -24,7 +25,6 @@ from hairkit.types.head import Head
 from hairkit.types.skin import Blendshape
 
 from .extras import VERSION, with_extras
-from .meshes import JOINTS
 from .options import Options
 
 _LINES, _LOOP, _STRIP, _TRIANGLES = 1, 2, 3, 4
@@ -222,8 +222,8 @@ def _own_head(file: GlbFile, own: dict[str, Any]) -> Head | None:
     joints = np.zeros((3, 3))
     mesh, primitive = {}, None
     for node, placed in file.nodes_in_place():
-        if node.get("name") in JOINTS:
-            joints[JOINTS.index(node["name"])] = placed[:3, 3]
+        if node.get("name") in JOINT_NAMES:
+            joints[JOINT_NAMES.index(node["name"])] = placed[:3, 3]
         if "mesh" in node:
             for candidate in file.document["meshes"][node["mesh"]]["primitives"]:
                 if "_SCALP" in candidate["attributes"]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import itertools
 
 import numpy as np
 
@@ -11,12 +10,13 @@ from hairkit.arrays import Float32Array, Float64Array
 from hairkit.errors import InputError
 from hairkit.grooming.prepare_export import PreparedGroom
 from hairkit.head_model.bust import bust_under
+from hairkit.head_model.skinning import HEAD_JOINT, JOINT_NAMES, JOINT_PARENTS
 from hairkit.io.glb_document import Document
 from hairkit.types.groom import Groom
 
 from .baking import Baked, bake
 from .extras import groom_extras
-from .meshes import HEAD_JOINT, JOINTS, ROUGHNESS, Meshes, brightest
+from .meshes import ROUGHNESS, Meshes, brightest
 from .options import Options
 from .strips import hair_meshes
 from .texture import strand_pictures, white_picture
@@ -87,13 +87,9 @@ def _scene(
     """
     joints = groom.head.joints.astype(np.float64)
     offsets = np.diff(joints, axis=0, prepend=np.zeros((1, 3)))
-    numbers: list[int] = []
-    for name, offset in zip(JOINTS, offsets, strict=True):
-        numbers.append(document.add("nodes", name=name, translation=offset.tolist()))
-    for above, below in itertools.pairwise(numbers):
-        document.json["nodes"][above]["children"] = [below]
+    numbers = document.joints(JOINT_NAMES, joints, JOINT_PARENTS)
     nodes, at_top = [], []
-    skin = _skin(document, numbers, joints) if any(name != LINES for name, _ in parts) else None
+    skin = document.skin(numbers, joints) if any(name != LINES for name, _ in parts) else None
     for name, mesh in parts:
         if name == LINES:
             node = document.add("nodes", name=name, mesh=mesh, translation=_back(offsets))
@@ -113,25 +109,6 @@ def _back(offsets: Float64Array) -> list[float]:
     place = functools.reduce(np.add, offsets)
     back: list[float] = (-place).tolist()
     return back
-
-
-def _skin(document: Document, nodes: list[int], joints: Float64Array) -> int:
-    return document.add(
-        "skins",
-        name="skeleton",
-        joints=nodes,
-        skeleton=nodes[0],
-        inverseBindMatrices=_inverse_bind(document, joints),
-    )
-
-
-def _inverse_bind(document: Document, joints: Float64Array) -> int:
-    if "skins" in document.json:
-        number: int = document.json["skins"][0]["inverseBindMatrices"]
-        return number
-    matrices = np.tile(np.eye(4, dtype=np.float32), (len(joints), 1, 1))
-    matrices[:, 3, :3] = -joints  # column-major: the place is in the last row of the array
-    return document.accessor(matrices, None)
 
 
 def _animate(

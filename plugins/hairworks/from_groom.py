@@ -10,6 +10,7 @@ import numpy as np
 from hairkit.arrays import Float64Array, Int64Array
 from hairkit.colour import srgb_from_linear
 from hairkit.head_model.scalp import growth_mesh, roots_at
+from hairkit.head_model.skinning import HEAD_JOINT, JOINT_NAMES, JOINT_PARENTS
 from hairkit.types.groom import Groom
 from hairkit.types.head import Head, Roots
 from hairkit.types.strands import Strands
@@ -18,9 +19,6 @@ from hairkit.version import __version__
 from . import schema
 from .asset import ApxAsset, Material, MaterialValue
 from .space import LEFT_HANDED, file_from_head
-
-BONES = ("root", "neck", "head")
-PARENTS = (-1, 0, 1)
 
 LAST_MODIFIED = "2000-01-01 00:00:00 UTC"
 """Date in the file; fixed, so that equal grooms are equal files."""
@@ -75,11 +73,11 @@ def groom_to_asset(groom: Groom, layout: Layout) -> ApxAsset:
         end_indices=strands.offsets[1:] - 1,
         faces=faces[:, ::-1] if layout.handedness == LEFT_HANDED else faces,
         face_uvs=uv[:, ::-1] if layout.handedness == LEFT_HANDED else uv,
-        bone_indices=np.tile([float(BONES.index("head")), 0.0, 0.0, 0.0], (count, 1)),
+        bone_indices=np.tile([float(HEAD_JOINT), 0.0, 0.0, 0.0], (count, 1)),
         bone_weights=np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
-        bone_names=BONES,
+        bone_names=JOINT_NAMES,
         bind_poses=poses,
-        bone_parents=np.array(PARENTS),
+        bone_parents=np.array(JOINT_PARENTS),
         spheres=spheres,
         capsules=capsules,
         scene_unit=layout.centimetres,

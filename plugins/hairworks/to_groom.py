@@ -7,12 +7,13 @@ import numpy as np
 from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array
 from hairkit.colour import linear_from_srgb
 from hairkit.errors import FormatError
+from hairkit.head_model.skinning import JOINT_NAMES
 from hairkit.types.groom import Groom, HairMaterial, HairPhysics
 from hairkit.types.head import Capsules, Head
 from hairkit.types.strands import Strands
 
 from .asset import ApxAsset, Material
-from .from_groom import BONES, STANDARD_GRAVITY
+from .from_groom import STANDARD_GRAVITY
 from .space import file_from_head
 
 _SMALLEST_WIDTH_MM = 1e-3
@@ -83,7 +84,7 @@ def _joints(asset: ApxAsset, bones: Float64Array) -> Float64Array:
     way ends.
     """
     if not len(bones):
-        return np.zeros((len(BONES), 3))
+        return np.zeros((len(JOINT_NAMES), 3))
     lowered = [name.lower() for name in asset.bone_names]
     held = np.zeros(len(bones))
     np.add.at(held, asset.bone_indices.astype(np.int64), asset.bone_weights)

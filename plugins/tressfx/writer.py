@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from hairkit.arrays import Float32Array
+from hairkit.head_model.skinning import HEAD_JOINT, JOINT_NAMES
 from hairkit.io.byte_writer import as_bytes, join_bytes
 from hairkit.io.coordinate_space import FileSpace
 from hairkit.types.groom import Groom
@@ -17,8 +18,6 @@ from .binary import HEADER, VERSION
 
 FIXED = 2
 """Points at the root that do not move."""
-JOINTS = ("root", "neck", "head")
-"""Names of the joints of a groom's head, in its order."""
 
 INFLUENCES = 4
 STRAND = np.dtype([("strand", "<i4"), ("pairs", [("bone", "<i4"), ("weight", "<f4")], INFLUENCES)])
@@ -83,13 +82,13 @@ def _padding(numbers: int) -> int:
 
 def bone_bytes(strands: int) -> memoryview:
     """Return the whole .tfxbone: the joints' names, and every strand carried by the head alone."""
-    names = struct.pack("<i", len(JOINTS))
-    for index, name in enumerate(JOINTS):
+    names = struct.pack("<i", len(JOINT_NAMES))
+    for index, name in enumerate(JOINT_NAMES):
         text = name.encode("ascii") + b"\0"
         names += struct.pack("<ii", index, len(text)) + text
     rows = np.zeros(strands, STRAND)
     rows["strand"] = np.arange(strands)
-    rows["pairs"]["bone"][:, 0] = JOINTS.index("head")
+    rows["pairs"]["bone"][:, 0] = HEAD_JOINT
     rows["pairs"]["weight"][:, 0] = 1.0
     head = names + struct.pack("<i", strands)
     return join_bytes([("u1", np.frombuffer(head, np.uint8)), (STRAND, rows)])
