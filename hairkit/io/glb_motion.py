@@ -9,9 +9,10 @@ import os
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import BPoly, make_interp_spline
 from scipy.spatial.transform import Rotation, Slerp
 
-from hairkit.arrays import Float64Array, Int64Array
+from hairkit.arrays import Float64Array
 from hairkit.io.glb_file import GlbFile, node_matrix, readable
 
 RATE = 60.0
@@ -142,33 +143,19 @@ def _sample(
     Quaternions are of any length, but not 0.
     """
     times = np.clip(times, keys[0], keys[-1])
-    after = np.clip(np.searchsorted(keys, times, side="right"), 1, max(len(keys) - 1, 1))
-    if len(keys) == 1:
-        after = np.zeros(len(times), np.int64)
-    before = np.maximum(after - 1, 0)
-    span = np.maximum(keys[after] - keys[before], 1e-9)
-    share = np.clip((times - keys[before]) / span, 0, 1)[:, None]
-    if way == "STEP":
-        return values[np.where(share[:, 0] >= 1, after, before)]
     if way == "CUBICSPLINE":
-        return _spline(values.reshape(len(keys), 3, -1), before, after, span[:, None], share)
-    if turning and len(keys) > 1:
-        turns: Float64Array = Slerp(keys, Rotation.from_quat(values))(times).as_quat()
-        return turns
-    result: Float64Array = values[before] * (1 - share) + values[after] * share
-    return result
-
-
-def _spline(
-    values: Float64Array, before: Int64Array, after: Int64Array, span: Float64Array, t: Float64Array
-) -> Float64Array:
-    """Return cubic Hermite values; `values` (K, 3, width) are in-tangent, value, out-tangent."""
-    result: Float64Array = (
-        (2 * t**3 - 3 * t**2 + 1) * values[before, 1]
-        + span * (t**3 - 2 * t**2 + t) * values[before, 2]
-        + (3 * t**2 - 2 * t**3) * values[after, 1]
-        + span * (t**3 - t**2) * values[after, 0]
-    )
+        arriving, values, leaving = values.reshape(len(keys), 3, -1).swapaxes(0, 1)
+    result: Float64Array
+    if way == "STEP" or len(keys) == 1:
+        result = values[np.searchsorted(keys, times, side="right") - 1]
+    elif way == "CUBICSPLINE":
+        third = np.diff(keys)[:, None] / 3
+        inner = values[:-1] + third * leaving[:-1], values[1:] - third * arriving[1:]
+        result = BPoly(np.stack([values[:-1], *inner, values[1:]]), keys)(times)
+    elif turning:
+        result = Slerp(keys, Rotation.from_quat(values))(times).as_quat()
+    else:
+        result = make_interp_spline(keys, values, k=1)(times)
     return result
 
 
