@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import map_coordinates
 
 from hairkit import Camera, Capture, Head, Mask, Scene, hookimpl
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
@@ -167,24 +168,11 @@ def _inside_by(
     metres = camera.focal if camera.model == "orthographic" else camera.focal / camera.depth(places)
     values = []
     for moved in (places, places + SLOPE_STEP * normals):
-        column, row = np.nan_to_num(camera.project(moved) * scale - 0.5, nan=-1).T
-        values.append(_bilinear(field, column, row) / metres)
-    slope = np.where(np.isfinite(values[0]) & np.isfinite(values[1]), values[1], 0.0)
-    slope = (
-        slope - np.where(np.isfinite(values[0]) & np.isfinite(values[1]), values[0], 0.0)
-    ) / SLOPE_STEP
+        place = np.nan_to_num(camera.project(moved)[:, ::-1] * scale - 0.5, nan=-1).T
+        values.append(map_coordinates(field, place, float, order=1, cval=np.inf) / metres)
+    known = np.isfinite(values[0]) & np.isfinite(values[1])
+    slope = np.subtract(values[1], values[0], out=np.zeros(len(places)), where=known) / SLOPE_STEP
     return values[0], slope
-
-
-def _bilinear(field: Float32Array, column: Float64Array, row: Float64Array) -> Float64Array:
-    height, width = field.shape
-    inside = (column >= 0) & (row >= 0) & (column < width - 1) & (row < height - 1)
-    i = np.where(inside, row, 0).astype(int)
-    j = np.where(inside, column, 0).astype(int)
-    y, x = row - i, column - j
-    upper = field[i, j] * (1 - x) + field[i, j + 1] * x
-    lower = field[i + 1, j] * (1 - x) + field[i + 1, j + 1] * x
-    return np.where(inside, upper * (1 - y) + lower * y, np.inf)
 
 
 def _warp(head: Head, places: Float64Array, moves: Float64Array, smoothing: Float64Array) -> Head:

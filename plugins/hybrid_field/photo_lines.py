@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -39,8 +38,6 @@ MIN_COSINE = 0.8
 """Cosine of the sharpest turn in one step; beyond 37 degrees it is another strand."""
 LEAST_TRACE = 1e-6
 """Certainty below which the tensors along a line are unknown."""
-SHORTEST_EDGE = 1e-12
-"""Metres between points of a line below which they are one."""
 MIN_LINES = 64
 """Least number of lines worth a call on another thread."""
 
@@ -62,7 +59,9 @@ def lift_photo_lines(
             _follow_photo, len(rows), photo, rows, columns, lines, counts, min_chunk=MIN_LINES
         )
         # one by one: a line has a point for each pixel, many times as many as it keeps
-        found.append(_resample_lines(*lift_lines(camera, lines, counts)))
+        lifted = lift_lines(camera, lines, counts)
+        long = lifted.lengths() >= (FEWEST - 1) * STEP
+        found.append(lifted.select(long).resampled_by_length(STEP))
     return join_lines(found)
 
 
@@ -74,21 +73,16 @@ def join_lines(parts: Sequence[Strands]) -> Strands:
     )
 
 
-def lift_lines(
-    camera: Camera, lines: Float32Array, counts: Int64Array
-) -> tuple[Float32Array, Int64Array, Float64Array]:
-    """Return packed smooth points (P, 3) in the head frame of all long lines.
-
-    And, of each of the lines (S,), the number of points and the length in metres.
-    """
+def lift_lines(camera: Camera, lines: Float32Array, counts: Int64Array) -> Strands:
+    """Return all long lines in the head frame, smooth, with their points as close as pixels."""
     long = np.flatnonzero(counts >= FEWEST)
     offsets = np.concatenate([[0], np.cumsum(counts[long])])
-    lifted = Lifted(offsets, np.empty((offsets[-1], 3), np.float32), np.empty(len(long)))
+    points = np.empty((offsets[-1], 3), np.float32)
     shift = np.arange(int(KERNEL_SIGMAS * SMOOTHING) + 1)
     weights = np.exp(-0.5 * (shift / SMOOTHING) ** 2)
-    view = pack_camera(camera)
-    parallel_for(_lift, len(long), view, lines, long, weights, lifted, min_chunk=MIN_LINES)
-    return lifted.points, counts[long], lifted.lengths
+    work = (pack_camera(camera), lines, long, weights, offsets, points)
+    parallel_for(_lift, len(long), *work, min_chunk=MIN_LINES)
+    return Strands(points, offsets)
 
 
 def agreeing(lines: Strands, hull: Hull, volume: Float32Array, angle_deg: float) -> Strands:
@@ -130,17 +124,6 @@ class TensorVolume(NamedTuple):
     """Edge of a cell, metres."""
     values: Float32Array
     """(X, Y, Z, 6) in the order xx yy zz xy xz yz, each times its certainty."""
-
-
-class Lifted(NamedTuple):
-    """Lines in the head frame, one after the other."""
-
-    offsets: Int64Array
-    """(K + 1,) first point of each."""
-    points: Float32Array
-    """(P, 3) metres."""
-    lengths: Float64Array
-    """(K,) metres."""
 
 
 class Photo(NamedTuple):
@@ -239,18 +222,15 @@ def _lift(
     lines: Float32Array,
     chosen: Int64Array,
     weights: Float64Array,
-    lifted: Lifted,
+    offsets: Int64Array,
+    points: Float32Array,
 ) -> None:
-    """Write the chosen lines (K,) of u, v, depth (N, M, 3), smoothed, and their lengths."""
-    offsets, points, lengths = lifted
+    """Write the chosen lines (K,) of u, v, depth (N, M, 3), smoothed, into packed points."""
     for k in range(first, last):
         rough = np.empty((offsets[k + 1] - offsets[k], 3))
         for i in range(len(rough)):
             _unproject(camera, lines[chosen[k], i], rough[i])
         _smooth(rough, weights, points[offsets[k] : offsets[k + 1]])
-        lengths[k] = 0.0
-        for i in range(offsets[k] + 1, offsets[k + 1]):
-            lengths[k] += _apart(points[i - 1], points[i])
 
 
 @compiled
@@ -281,56 +261,6 @@ def _smooth(rough: Float64Array, weights: Float64Array, smooth: Float32Array) ->
             z += weight * rough[j, 2]
             norm += weight
         smooth[i, 0], smooth[i, 1], smooth[i, 2] = x / norm, y / norm, z / norm
-
-
-@compiled
-def _apart(first: Float32Array, second: Float32Array) -> float:
-    """Return the distance of two points (3,)."""
-    x, y, z = second[0] - first[0], second[1] - first[1], second[2] - first[2]
-    return math.sqrt(np.float64(x) * x + np.float64(y) * y + np.float64(z) * z)
-
-
-def _resample_lines(points: Float32Array, counts: Int64Array, lengths: Float64Array) -> Strands:
-    """Return packed lines (P, 3) as strands with points `STEP` apart, without the shortest."""
-    long = lengths >= (FEWEST - 1) * STEP
-    starts = (np.cumsum(counts) - counts)[long]
-    even = np.ceil(lengths[long] / STEP - 1e-9).astype(np.int64) + 1
-    offsets = np.concatenate([[0], np.cumsum(even)])
-    resampled = np.empty((offsets[-1], 3), np.float32)
-    lines = (points, starts, counts[long], lengths[long], offsets, resampled)
-    parallel_for(_space_evenly, len(starts), *lines, min_chunk=MIN_LINES)
-    return Strands(resampled, offsets)
-
-
-@compiled
-def _space_evenly(
-    first: int,
-    last: int,
-    points: Float32Array,
-    starts: Int64Array,
-    counts: Int64Array,
-    lengths: Float64Array,
-    offsets: Int64Array,
-    resampled: Float32Array,
-) -> None:
-    """Write lines `first` to `last` of packed points (P, 3) with equal distances along each.
-
-    `starts`, `counts` and `lengths` (S,) are those of the lines, `offsets` (S + 1,) those of the
-    result (R, 3).
-    """
-    for s in range(first, last):
-        i, end = starts[s] + 1, starts[s] + counts[s] - 1
-        before, edge = 0.0, _apart(points[i - 1], points[i])
-        step = lengths[s] / (offsets[s + 1] - offsets[s] - 1)
-        for k in range(offsets[s], offsets[s + 1]):
-            at = (k - offsets[s]) * step
-            while i < end and before + edge <= at:
-                before += edge
-                i += 1
-                edge = _apart(points[i - 1], points[i])
-            share = min((at - before) / max(edge, SHORTEST_EDGE), 1.0)
-            for axis in range(3):
-                resampled[k, axis] = points[i - 1, axis] * (1 - share) + points[i, axis] * share
 
 
 @compiled_with(allocates=True)
