@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from scipy.ndimage import gaussian_filter1d
 
 from hairkit import Camera, Hull, Mask, Strands
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
-from hairkit.cameras.projection_kernels import PackedCamera, pack_camera, perspective_divisor
 from hairkit.field.sampling_kernels import copy_point, sample_at
 from hairkit.field.view_fusion import DEPTH_SHRINK, FusedViews
 from hairkit.parallel import compiled, compiled_with, parallel_for
@@ -28,8 +28,8 @@ STEP = 0.002
 """Metres between a segment's points."""
 SMOOTHING = 3.0
 """Gaussian in points under which lifted lines are smoothed: the hull's front has steps."""
-KERNEL_SIGMAS = 3
-"""Half width of that Gaussian's kernel in its sigmas."""
+REACH = 9
+"""Points on either side that have weight in it."""
 LINE_SPACING = 10
 """Pixels between the lines that are followed in a photo."""
 FEWEST = 5
@@ -74,15 +74,21 @@ def join_lines(parts: Sequence[Strands]) -> Strands:
 
 
 def lift_lines(camera: Camera, lines: Float32Array, counts: Int64Array) -> Strands:
-    """Return all long lines in the head frame, smooth, with their points as close as pixels."""
-    long = np.flatnonzero(counts >= FEWEST)
+    """Return all long lines in the head frame, smooth, with their points as close as pixels.
+
+    `lines` (N, M, 3) are u, v and axial depth, and `counts` (N,) the points that each has of them.
+    """
+    long = counts >= FEWEST
+    packed = lines[np.arange(lines.shape[1]) < np.where(long, counts, 0)[:, None]]
     offsets = np.concatenate([[0], np.cumsum(counts[long])])
-    points = np.empty((offsets[-1], 3), np.float32)
-    shift = np.arange(int(KERNEL_SIGMAS * SMOOTHING) + 1)
-    weights = np.exp(-0.5 * (shift / SMOOTHING) ** 2)
-    work = (pack_camera(camera), lines, long, weights, offsets, points)
-    parallel_for(_lift, len(long), *work, min_chunk=MIN_LINES)
-    return Strands(points, offsets)
+    # rows of zeros between the lines, and of each point the weight that it is smoothed with
+    row = np.arange(len(packed)) + REACH * np.repeat(np.arange(long.sum()), counts[long])
+    spaced = np.zeros((len(packed) + REACH * long.sum(), 4))
+    spaced[row] = np.column_stack(
+        [camera.unproject(packed[:, :2], packed[:, 2]), np.ones(len(row))]
+    )
+    smooth = gaussian_filter1d(spaced, SMOOTHING, 0, mode="constant", radius=REACH)[row]
+    return Strands((smooth[:, :3] / smooth[:, 3:]).astype(np.float32), offsets)
 
 
 def agreeing(lines: Strands, hull: Hull, volume: Float32Array, angle_deg: float) -> Strands:
@@ -212,55 +218,6 @@ def _follow_line(photo: Photo, x: float, y: float, sign: float, line: Float32Arr
         x += PIXELS * c
         y += PIXELS * s
     return len(line)
-
-
-@compiled_with(allocates=True)
-def _lift(
-    first: int,
-    last: int,
-    camera: PackedCamera,
-    lines: Float32Array,
-    chosen: Int64Array,
-    weights: Float64Array,
-    offsets: Int64Array,
-    points: Float32Array,
-) -> None:
-    """Write the chosen lines (K,) of u, v, depth (N, M, 3), smoothed, into packed points."""
-    for k in range(first, last):
-        rough = np.empty((offsets[k + 1] - offsets[k], 3))
-        for i in range(len(rough)):
-            _unproject(camera, lines[chosen[k], i], rough[i])
-        _smooth(rough, weights, points[offsets[k] : offsets[k + 1]])
-
-
-@compiled
-def _unproject(camera: PackedCamera, pixel: Float32Array, point: Float64Array) -> None:
-    """Write the head frame point (3,) of pixel u, v and axial depth: `Camera.unproject`."""
-    depth = np.float64(pixel[2])
-    scale = perspective_divisor(camera, depth)
-    x = (pixel[0] - camera.centre_u) / camera.focal * scale - camera.translation[0]
-    y = (pixel[1] - camera.centre_v) / camera.focal * scale - camera.translation[1]
-    z = depth - camera.translation[2]
-    for axis in range(3):
-        point[axis] = x * camera.right[axis] + y * camera.down[axis] + z * camera.forward[axis]
-
-
-@compiled
-def _smooth(rough: Float64Array, weights: Float64Array, smooth: Float32Array) -> None:
-    """Write a line (M, 3) smoothed by a symmetric kernel into smooth (M, 3).
-
-    `weights` (R,) are the kernel's middle and one side; points beyond the ends have no weight.
-    """
-    reach = len(weights) - 1
-    for i in range(len(rough)):
-        x, y, z, norm = 0.0, 0.0, 0.0, 0.0
-        for j in range(max(i - reach, 0), min(i + reach + 1, len(rough))):
-            weight = weights[abs(i - j)]
-            x += weight * rough[j, 0]
-            y += weight * rough[j, 1]
-            z += weight * rough[j, 2]
-            norm += weight
-        smooth[i, 0], smooth[i, 1], smooth[i, 2] = x / norm, y / norm, z / norm
 
 
 @compiled_with(allocates=True)
