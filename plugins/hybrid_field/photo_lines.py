@@ -10,11 +10,11 @@ import numpy.typing as npt
 from scipy.ndimage import gaussian_filter1d
 
 from hairkit import Camera, Hull, Mask, Strands
-from hairkit.arrays import Float32Array, Float64Array, Int64Array
-from hairkit.field.sampling_kernels import copy_point, sample_at
+from hairkit.arrays import Float32Array, Int64Array
+from hairkit.field.sampling_kernels import copy_point
 from hairkit.field.view_fusion import DEPTH_SHRINK, FusedViews
 from hairkit.parallel import compiled, compiled_with, parallel_for
-from hairkit.types.volume import XX, XY, XZ, YY, YZ, ZZ
+from hairkit.types.volume import outer_products
 
 from .options import Options
 
@@ -96,10 +96,11 @@ def agreeing(lines: Strands, hull: Hull, volume: Float32Array, angle_deg: float)
 
     A tensor's trace is its certainty, so the mean over a line is one of the certain cells.
     """
-    share = np.empty(len(lines))
-    tensors = TensorVolume(hull.grid.origin, hull.grid.spacing, volume)
-    along = (tensors, lines.points, lines.offsets, share)
-    parallel_for(_share_along, len(lines), *along, min_chunk=MIN_LINES)
+    tensor = hull.grid.sample(volume, lines.points)
+    twice = [1, 1, 1, 2, 2, 2]  # what lies off the diagonal
+    along = np.add.reduceat((tensor * outer_products(lines.tangents())) @ twice, lines.offsets[:-1])
+    trace = np.add.reduceat(tensor[:, :3].sum(axis=1, dtype=np.float64), lines.offsets[:-1])
+    share = along / np.maximum(trace, LEAST_TRACE)
     return lines.select(share >= np.cos(np.radians(angle_deg)) ** 2)
 
 
@@ -119,17 +120,6 @@ def _seeds(weight: Float32Array, spacing: int) -> tuple[Int64Array, Int64Array]:
     row, column = np.nonzero(squares.max(axis=2) > CONFIDENT)
     inside = best[row, column]
     return row * spacing + inside // spacing, column * spacing + inside % spacing
-
-
-class TensorVolume(NamedTuple):
-    """Tensors on a grid."""
-
-    origin: Float64Array
-    """(3,) lowest corner of the grid, metres, head frame."""
-    spacing: float
-    """Edge of a cell, metres."""
-    values: Float32Array
-    """(X, Y, Z, 6) in the order xx yy zz xy xz yz, each times its certainty."""
 
 
 class Photo(NamedTuple):
@@ -218,41 +208,3 @@ def _follow_line(photo: Photo, x: float, y: float, sign: float, line: Float32Arr
         x += PIXELS * c
         y += PIXELS * s
     return len(line)
-
-
-@compiled_with(allocates=True)
-def _share_along(
-    first: int,
-    last: int,
-    tensors: TensorVolume,
-    points: Float32Array,
-    offsets: Int64Array,
-    share: Float64Array,
-) -> None:
-    """Write for lines `first` to `last` the share of the tensors' traces along their tangents.
-
-    `points` (P, 3) and `offsets` (S + 1,) are those of the strands, `share` is (S,).
-    """
-    tensor, d = np.empty(6), np.empty(3)
-    origin, spacing, values = tensors.origin, tensors.spacing, tensors.values
-    for s in range(first, last):
-        along, trace = 0.0, 0.0
-        for i in range(offsets[s], offsets[s + 1]):
-            ahead = min(i, offsets[s + 1] - 2)  # the last point has the tangent of the one before
-            square = 0.0
-            for axis in range(3):
-                d[axis] = np.float64(points[ahead + 1, axis]) - points[ahead, axis]
-                square += d[axis] * d[axis]
-            sample_at(origin, spacing, values, points[i], tensor)
-            trace += tensor[XX] + tensor[YY] + tensor[ZZ]
-            if square > 0:
-                along += _quadratic_form(tensor, d) / square
-        share[s] = along / max(trace, LEAST_TRACE)
-
-
-@compiled
-def _quadratic_form(t: Float64Array, d: Float64Array) -> float:
-    """Return d T d of a tensor (6,) and a vector (3,)."""
-    x, y, z = d[0], d[1], d[2]
-    square = t[XX] * x * x + t[YY] * y * y + t[ZZ] * z * z
-    return float(square + 2 * (t[XY] * x * y + t[XZ] * x * z + t[YZ] * y * z))

@@ -25,7 +25,6 @@ from .photo_lines import (
     FEWEST,
     MIN_LINES,
     STEP,
-    TensorVolume,
     agreeing,
     join,
     join_lines,
@@ -51,6 +50,17 @@ RUN_ON = 0.5
 FIRST_WAY = np.array([0.3, 0.9, 0.3])
 """Way that a line's two ends are sorted along; oblique, so that no frequent direction is square to
 it. The growth decides later which end is the root."""
+
+
+class TensorVolume(NamedTuple):
+    """Tensors on a grid."""
+
+    origin: Float64Array
+    """(3,) lowest corner of the grid, metres, head frame."""
+    spacing: float
+    """Edge of a cell, metres."""
+    values: Float32Array
+    """(X, Y, Z, 6) in the order xx yy zz xy xz yz, each times its certainty."""
 
 
 class Way(NamedTuple):
