@@ -91,7 +91,7 @@ def test_nobody_reads_a_capture_but_plugins() -> None:
         for path in package.rglob("*.py")
         if re.search(r"capture_reader import .*read_(capture|folder)", path.read_text())
     }
-    assert readers == {"__init__.py", "api.py", "cli/scaffold_sketches.py"}
+    assert readers == {"__init__.py", "api.py", "cli/scaffold.py"}
 
 
 def test_info_tells_of_a_name(shelf: Path, capsys: pytest.CaptureFixture[str]) -> None:
