@@ -16,10 +16,11 @@ out = Path(sys.argv[1] if len(sys.argv) > 1 else "gallery-out") / "batch"
 for style in ("short", "straight"):
     folder = out / "captures" / style
     if not folder.exists():
-        photograph(grow(style, default_head(), strands=1000, seed=1), folder, size=(300, 400))
+        hair = grow(style, default_head(), strands=1000, seed=1)
+        photograph(hair, folder, views=4, size=(300, 400))
 
 # Every capture has a process of its own, and one that fails does so alone. A second run keeps what
-# the first has done. Coarse cells keep this example quick.
+# the first has done. Coarse cells and four small photos a capture keep this example quick.
 settings = {"guides": 300, "settings": ["visual_hull.voxel_size=0.006"]}
 
 print("| capture | strands | F 4 mm/40 deg | mean length / true |")

@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
@@ -68,6 +68,8 @@ CASES: dict[str, tuple[Callable[[], Capture], str]] = {
     "chosen": (chosen, "default"),
     "thesis": (sample, "thesis"),
 }
+SKIN_FIRST = {"photos alone", "chosen"}
+"""Cases whose skin is asked for first by the process of one thread, the others by one of more."""
 
 
 @contextmanager
@@ -85,12 +87,14 @@ def digest(groom: Groom) -> str:
     return digest_of(*to_arrays(groom).values())
 
 
-def grooms(folder: Path, threads: int) -> dict[str, str]:
-    """Return digests of the grooms of all cases."""
+def grooms(folder: Path, threads: int, skin_first: Collection[str] = ()) -> dict[str, str]:
+    """Return digests of the grooms of all cases, of some after the skin and what is on it."""
     made = {}
     for name, (read, recipe) in CASES.items():
         manager = Manager.loaded(autoload=False)
         with findings_of(read(), load_recipe(recipe), manager, folder / name, threads) as findings:
+            if name in skin_first:
+                _ = findings.skin, findings.hairline, findings.parting, findings.view_orientations
             made[name] = digest(findings.groom)
     return made
 
@@ -102,7 +106,7 @@ def first(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str
     return folder, grooms(folder, thread_count())
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", sorted(set(CASES) - SKIN_FIRST))
 def test_the_order_of_questions_changes_no_byte(
     name: str, first: tuple[Path, dict[str, str]], manager: Manager, tmp_path: Path
 ) -> None:
@@ -130,7 +134,8 @@ def test_nothing_is_made_twice(
 def test_one_thread_waits_for_nothing_behind_it(
     first: tuple[Path, dict[str, str]], tmp_path: Path
 ) -> None:
-    """With one thread for all stages every run ends, with the grooms of several threads."""
+    """With one thread for all stages every run ends, with the grooms of several threads, those of
+    `SKIN_FIRST` in the other order too."""
     done = subprocess.run(
         [sys.executable, __file__, str(tmp_path), str(photo_skin.SIZE), str(photo_skin.COARSE)],
         env=os.environ | {"NUMBA_NUM_THREADS": "1", "PYTHONPATH": os.pathsep.join(sys.path)},
@@ -226,4 +231,4 @@ def test_a_table_without_a_plugin_is_refused() -> None:
 
 if __name__ == "__main__":
     photo_skin.SIZE, photo_skin.COARSE = map(int, sys.argv[2:])  # as in the process that compares
-    print(json.dumps(grooms(Path(sys.argv[1]), 1)))
+    print(json.dumps(grooms(Path(sys.argv[1]), 1, SKIN_FIRST)))

@@ -31,7 +31,7 @@ def server(
     started.kill()
 
 
-REQUESTS = int(os.environ.get("HAIRKIT_HOSTILE_REQUESTS", "1000"))
+REQUESTS = int(os.environ.get("HAIRKIT_HOSTILE_REQUESTS", "400"))
 MOST_MEMORY = 500 * 2**20
 """Bytes of the server's process."""
 
@@ -260,8 +260,8 @@ def kinds_of(server: Server) -> list[tuple[str, str, Any, dict[str, Any]]]:
     ]
 
 
-def test_a_thousand_requests_at_once(server: Server) -> None:
-    """Of a thousand parallel requests of twenty kinds none succeeds, and memory stays bounded.
+def test_a_crowd_of_requests_at_once(server: Server) -> None:
+    """Of 400 requests of twenty kinds, 100 at a time, none succeeds, and memory stays bounded.
 
     `HAIRKIT_HOSTILE_REQUESTS` asks for another number.
     """
