@@ -15,7 +15,7 @@ COLOUR = "colour"
 
 
 def hair_material(root_colour, tip_colour):
-    """Return a hair material (Chiang et al. 2016) in the points' own colour, or from root to tip."""
+    """Return a hair material (Chiang et al. 2016) in colours of points, or from root to tip."""
     material = bpy.data.materials.new("hair")
     material.use_nodes = True
     tree = material.node_tree
