@@ -9,7 +9,8 @@ time on an otherwise idle machine. `chosen` is what the frame budget settles on,
 is drawn by compute shaders, meant for a graphics card, or by compiled loops on the processor, which
 the viewer uses without one.
 
-The last line is a still picture with all its samples, and the most memory that the program took
+A line below says the same of a comb that is led over the hair, which the budget hurries. The last
+one is a still picture with all its samples, and the most memory that the program took
 until then; `--still` measures nothing else.
 """
 
@@ -21,7 +22,10 @@ import resource
 import statistics
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
+
+import numpy as np
 
 from hairkit.cli.render import parse_size
 from hairkit.head_model.template import default_head
@@ -50,7 +54,9 @@ def main() -> int:
     args = _arguments()
     with tempfile.TemporaryDirectory() as folder, renderer() as gl:
         path = Path(folder) / "groom.npz"
-        grow("straight", default_head(), args.guides).save(path)
+        groom = grow("straight", default_head(), args.guides)
+        marked = replace(groom.strands, guide=np.ones(len(groom.strands), np.bool_))
+        replace(groom, strands=marked).save(path)
         print(f"{gl.description}, {os.cpu_count()} cores\n")
         print(f"{args.guides} guides, {args.hairs} hairs, {args.size}, {args.pictures} pictures\n")
         print(f"| {' | '.join(HEADINGS)} |\n|{'---|' * len(HEADINGS)}")
@@ -66,6 +72,8 @@ def main() -> int:
             for soft, level in rows:
                 _row(args, gl, session, level, soft)
             _row(args, gl, session, rows[-1][1], None, shaken=False)
+        if not args.still:
+            _comb(args, gl, session)
         _still(args, gl, path)
     return 0
 
@@ -128,6 +136,29 @@ def _row(
         f" | {name} | {1e3 * wall:.0f}"
         f" | {1 / wall:.1f} | {1e3 * processor:.0f} | {1 / processor:.1f} |",
         flush=True,
+    )
+    preview.release()
+
+
+def _comb(args: argparse.Namespace, gl: Renderer, session: Session) -> None:
+    """Print how fast a comb goes over all guides."""
+    preview = Preview(gl, session, Budget(1e-3 * args.budget))
+    perform(session, "brush", {"name": "comb"})
+    strokes, pictures, (width, height) = [], [], session.size
+    for k in range(SETTLING):
+        began = time.perf_counter()
+        perform(session, "stroke", {"x": 0.42 * width + 2 * k, "y": 0.4 * height + k % 20})
+        combed = time.perf_counter()
+        preview.frame(STEP)
+        gl.context.finish()
+        strokes.append(combed - began)
+        pictures.append(time.perf_counter() - combed)
+    stroke, picture = (statistics.median(part[SETTLING // 2 :]) for part in (strokes, pictures))
+    quality = LEVELS[preview.budget.level]
+    print(
+        f"\ncomb over {len(session.body.guides)} guides: stroke {1e3 * stroke:.1f} ms, picture"
+        f" {1e3 * picture:.1f} ms, {1 / (stroke + picture):.0f} a second; scale {quality.scale},"
+        f" {quality.share:.0%} of hairs"
     )
     preview.release()
 

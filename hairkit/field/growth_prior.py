@@ -196,15 +196,10 @@ def _from_crown(head: Head, at: Float64Array, outward: Float64Array) -> Float64A
 
 def gradient(grid: VoxelGrid, values: Float32Array, points: npt.ArrayLike) -> Float64Array:
     """Return the unit gradient of values (X, Y, Z) at points (N, 3); zero where it vanishes."""
-    at, h = np.asarray(points, np.float64), grid.spacing
-    slope = np.stack(
-        [
-            grid.sample(values, at + h * axis) - grid.sample(values, at - h * axis)
-            for axis in np.eye(3)
-        ],
-        axis=1,
-    ).astype(np.float64)
-    return unit_vectors(slope)
+    at, steps = np.asarray(points, np.float64), grid.spacing * np.eye(3)[:, None]
+    ends = np.stack([at + steps, at - steps]).reshape(-1, 3)
+    after, before = grid.sample(values, ends).reshape(2, 3, -1)
+    return unit_vectors((after - before).T.astype(np.float64))
 
 
 def measure_scalp_distance(head: Head, hull: Hull) -> ScalpDistance:

@@ -99,10 +99,23 @@ class Stroke(NamedTuple):
 
     def reach(self, points: npt.NDArray[np.floating]) -> tuple[Float64Array, Int64Array]:
         """Return how much (...) the stroke acts at points (..., 3), 0 to 1, and its place there."""
+        amount, place = np.ones(points.shape[:-1]), np.zeros(points.shape[:-1], int)
+        if len(self.path):
+            near, tree = self.near(points), cKDTree(self.path)
+            away, at = tree.query(points[near], distance_upper_bound=self.radius)
+            amount[~near], amount[near] = 0, falloff(away / self.radius)
+            place[near] = np.minimum(at, len(self.path) - 1)
+        return amount, place
+
+    def near(self, points: npt.NDArray[np.floating]) -> BoolArray:
+        """Return which points (..., 3) are in a box about the stroke."""
         if not len(self.path):
-            return np.ones(points.shape[:-1]), np.zeros(points.shape[:-1], int)
-        query = cKDTree(self.path).query(points, distance_upper_bound=self.radius)
-        return falloff(query[0] / self.radius), np.minimum(query[1], len(self.path) - 1)
+            return np.ones(points.shape[:-1], np.bool_)
+        low, high = self.path.min(axis=0) - self.radius, self.path.max(axis=0) + self.radius
+        x, y, z = (
+            (low[k] < points[..., k]) & (points[..., k] < high[k]) for k in range(points.shape[-1])
+        )
+        return np.asarray(x & y & z)
 
 
 @dataclass(eq=False)
@@ -185,6 +198,8 @@ class Hair:
 
         Those that it removed are stubs; those that it added are not among them.
         """
+        if np.array_equal(self.number, before.number):
+            return self.points, self.colours
         points, colours = before.points.copy(), before.colours.copy()
         points += (1 - STUB) * (points[:, :1] - points)
         old = self.number >= 0

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from hairkit.arrays import BoolArray, Float64Array
+from hairkit.arrays import Float64Array
 from hairkit.errors import InputError
 from hairkit.grooming.brushed_hair import Hair, Stroke, falloff, strokes_of
 from hairkit.grooming.density import add, thin
@@ -163,22 +163,14 @@ def brush_hair(hair: Hair, edit: Edit, brushes: Mapping[str, Kind] = BRUSHES) ->
     strokes = strokes_of(edit, kind.amount)
     if kind.on_skin:
         strokes = [each._replace(path=hair.room.on_skin(each.path)) for each in strokes]
-    index = np.flatnonzero(_may_touch(hair.points, strokes) & hair.in_group(setting.group))
+    near = np.any([stroke.near(hair.points).any(axis=1) for stroke in strokes], axis=0)
+    index = np.flatnonzero(near & hair.in_group(setting.group))
     index = index[_touched(hair.points[index], strokes) > 0]
     some = hair.take(index)
     kind.apply(some, strokes)
     some.outside()
     hair.put(index, some)
     return len(some.points) > 0
-
-
-def _may_touch(points: Float64Array, strokes: list[Stroke]) -> BoolArray:
-    """Return which strands (S, M, 3) come into a box about the strokes."""
-    found, axes = np.full(points.shape[:2], not len(strokes[0].path)), np.moveaxis(points, 2, 0)
-    for path, radius, *_ in strokes if len(strokes[0].path) else ():
-        low, high = path.min(axis=0) - radius, path.max(axis=0) + radius
-        found |= np.all([(lo < x) & (x < hi) for lo, x, hi in zip(low, axes, high, strict=True)], 0)
-    return np.asarray(found.any(axis=1))
 
 
 def _touched(points: Float64Array, strokes: list[Stroke]) -> Float64Array:

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from hairkit.arrays import Float32Array, Float64Array, unit_vectors
+from hairkit.arrays import Float32Array
+from hairkit.field.growth_prior import gradient
 from hairkit.types.strands import Strands
 from hairkit.types.volume import VoxelGrid
 
@@ -27,19 +28,12 @@ def push_out_of_head(
     points = strands.points.astype(np.float64)
     apart = clearance * np.minimum(strands.arc_lengths() / FULL_AFTER, 1.0)
     apart[strands.offsets[:-1]] = -np.inf
-    near = np.flatnonzero(apart > grid.sample(distance, points))
+    cell = tuple(grid.nearest_cell(points).T)
+    near = np.flatnonzero(apart + grid.spacing > distance[cell])  # a distance changes no faster
     for _ in range(ROUNDS):
         lack = apart[near] - grid.sample(distance, points[near])
         near, lack = near[lack > 0], lack[lack > 0]
         if not len(near):
             break
-        points[near] += lack[:, None] * outward(grid, distance, points[near])
+        points[near] += lack[:, None] * gradient(grid, distance, points[near])
     return replace(strands, points=points.astype(np.float32))
-
-
-def outward(grid: VoxelGrid, distance: Float32Array, points: Float64Array) -> Float64Array:
-    """Return (N, 3) unit vectors along which a distance (X, Y, Z) grows most, 0 where flat."""
-    steps = grid.spacing * np.eye(3)
-    ends = [[grid.sample(distance, points + way * step) for way in (1, -1)] for step in steps]
-    slope = np.stack([after - before for after, before in ends], axis=1)
-    return unit_vectors(slope.astype(np.float64))

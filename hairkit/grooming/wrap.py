@@ -13,7 +13,7 @@ import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array, Int32Array, unit_vectors
 from hairkit.errors import InputError
-from hairkit.grooming.head_collision import outward
+from hairkit.field.growth_prior import gradient
 from hairkit.head_model.bvh import build_tree, nearest_on_surface
 from hairkit.head_model.carry_scalp import Carrier
 from hairkit.head_model.register_head import HeadMap, Surface, register_head
@@ -150,7 +150,7 @@ def _laid(
         for _ in range(SLIDES):
             lack = clearance[near] - grid.sample(distance, at[near])
             near, lack = near[lack > 0], lack[lack > 0]
-            away = at[near] + lack[:, None] * outward(grid, distance, at[near]) - before[near]
+            away = at[near] + lack[:, None] * gradient(grid, distance, at[near]) - before[near]
             at[near] = before[near] + length[near] * unit_vectors(away)
         laid[here] = at
     return laid

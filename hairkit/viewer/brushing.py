@@ -16,6 +16,8 @@ from hairkit.types.groom import Groom
 from hairkit.viewer.picking import nearest_point
 
 NAMES = ("none", *BRUSHES)
+COARSER = 2
+"""Of so many points of a strand one is looked for under the brush."""
 ASIDE = 0.06
 """Metres from a place of the brush within which the next one is on hair that is seen."""
 
@@ -43,6 +45,11 @@ class Brushing:
     def groom(self) -> Groom:
         """The groom after all strokes that are done."""
         return edit_groom(self.before, Edits(tuple(self.strokes)))
+
+    @property
+    def down(self) -> bool:
+        """Whether a stroke is under way."""
+        return self._lifted is not None
 
     @property
     def rows(self) -> Float64Array:
@@ -93,7 +100,9 @@ class Brushing:
         A stroke goes no farther in depth than across, and at its own depth where nothing is.
         """
         on_hair = self.setting.group == "hair"
-        points = self.hair.points.reshape(-1, 3) if on_hair else self.before.head.vertices
+        points = self.before.head.vertices
+        if on_hair:
+            points = self.hair.points[:, ::COARSER].reshape(-1, 3)
         for axis, at in enumerate(self._way[-1] if self._way else ()):  # not at hair elsewhere
             points = points[np.abs(points[:, axis] - at) < ASIDE]
         picked = nearest_point(camera, points.astype(np.float32), pixel)

@@ -114,6 +114,8 @@ class Preview:
         self._save_picture()
         drawn = time.perf_counter()
         if not (shot or still):
+            brush = self.session.brushing
+            self.budget.hurried = brush is not None and brush.down
             self.budget.record(drawn - simulated, simulated - began)
         self._update_readings(simulated - began, drawn - simulated)
 

@@ -12,6 +12,8 @@ HEADROOM = 0.55
 """The quality is raised only below this share of the allowed time."""
 RAISE_AFTER, RAISE_AFTER_MAX = 24, 1500
 """Frames to wait before raising the quality; doubled after a raise that was reverted."""
+HURRIED = 1 / 60
+"""Allowed time of a frame that follows a hand, seconds."""
 
 
 @dataclass(frozen=True)
@@ -45,6 +47,8 @@ class Budget:
     seconds: float = 1 / 20
     """Allowed time of a frame with its simulation, of which drawing gets at least half; 0: best."""
     level: int = 1
+    hurried: bool = False
+    """Whether a brush is led, so that frames have less time."""
     taken: float = 0.0
     """Moving average of the draw time, seconds."""
     _wait: int = SETTLE_FRAMES
@@ -59,7 +63,8 @@ class Budget:
 
     def record(self, seconds: float, simulated: float = 0.0) -> None:
         """Record how many seconds a frame took to draw and to simulate."""
-        allowed = max(self.seconds - simulated, 0.5 * self.seconds)
+        whole = min(self.seconds, HURRIED) if self.hurried else self.seconds
+        allowed = max(whole - simulated, 0.5 * whole)
         self.taken += SMOOTHING * (seconds - self.taken) if self.taken else seconds
         self._wait -= 1
         self._frames_until_raise -= 1

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import astuple
 
-from hairkit.viewer.draw.frame_budget import LEVELS, Budget
+from hairkit.viewer.draw.frame_budget import HURRIED, LEVELS, Budget
 
 
 def settle(budget: Budget, times: list[float], pictures: int = 400) -> None:
@@ -22,6 +22,20 @@ def test_slow_drawing_draws_less_until_it_fits() -> None:
     assert budget.level == 3
     settle(budget, times)
     assert budget.level == 3
+
+
+def test_a_hand_gets_sixty_frames_a_second() -> None:
+    """While a brush is led pictures are made faster, and better again when it is lifted."""
+    budget = Budget(0.05)
+    times = [0.02, 0.018, 0.015, 0.011, 0.008, 0.006, 0.004]
+    settle(budget, times)
+    assert budget.level == 0
+    budget.hurried = True
+    settle(budget, times, 40)
+    assert times[budget.level] <= HURRIED
+    budget.hurried = False
+    settle(budget, times)
+    assert budget.level == 0
 
 
 def test_fast_drawing_draws_the_best() -> None:
