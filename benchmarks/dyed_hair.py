@@ -5,9 +5,10 @@ strands whose roots lie from 2 to 6 cm left of the middle blue. The table says, 
 as photographed too, whether hair is taken for dyed, and how far the hues of the points that photos
 show are off (mean, logarithms of red, green and blue less their luma) with and without.
 
-    python benchmarks/dyed_hair.py RESULTS CAPTURE...
+    python benchmarks/dyed_hair.py CAPTURES --results RESULTS
 
-RESULTS holds a folder of `hairkit reconstruct` for each capture, by the capture's name.
+RESULTS holds a folder of `hairkit reconstruct` for each capture, by the capture's name. Without
+them hues are looked for along true strands by true cameras.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+from captures_argument import NO_CAPTURES, add_captures
 from scipy.spatial import cKDTree
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, UInt8Array
@@ -28,6 +30,7 @@ from hairkit.evaluation.prediction import read_prediction
 from hairkit.evaluation.truth import Truth, read_truth
 from hairkit.grooming.photo_colours import find_dyes, measure_colour
 from hairkit.grooming.prepare_export import point_colours
+from hairkit.head_model.scalp import bind
 from hairkit.types.camera import Camera
 from hairkit.types.capture import View
 from hairkit.types.groom import Groom
@@ -36,6 +39,8 @@ from hairkit.types.mask import Mask
 PINK, BLUE = np.log([2.5, 0.6, 1.4]), np.log([0.5, 0.9, 3.0])
 STEP, RADIUS, BEHIND = 0.003, 0.004, 0.006
 HEIGHT, BLUR = 540, 1.2
+GUIDES = 600
+"""Of the true strands at most, where there is no result."""
 LEAST = 1e-6
 LUMA = np.array([0.2126, 0.7152, 0.0722])
 
@@ -58,36 +63,51 @@ DYES: dict[str, Dye | None] = {"as it is": None, "pink tips": pink_tips, "blue s
 def main() -> None:
     """Print a line for each capture and dye."""
     parser = argparse.ArgumentParser(prog="dyed_hair.py", description=__doc__)
-    parser.add_argument("results", type=Path)
-    parser.add_argument("captures", type=Path, nargs="+")
+    add_captures(parser)
+    parser.add_argument("--results", type=Path, help="folder of results")
     args = parser.parse_args()
-    print(f"{'capture':14} {'hair':12} found   off  off without")
-    for capture in args.captures:
+    if args.captures is None:
+        print(NO_CAPTURES)
+        return
+    print("| capture | hair | found | off | off with one ramp |\n|---|---|---|---|---|")
+    for capture in sorted(path.parent for path in args.captures.glob("*/truth")):
+        if args.results is not None and not (args.results / capture.name).is_dir():
+            continue
         for name, dye in DYES.items():
-            found, off, without = judge(args.results / capture.name, capture, dye)
-            print(f"{capture.name:14} {name:12} {found!s:5} {off:5.2f} {without:7.2f}")
+            found, off, without = judge(args.results, capture, dye)
+            print(f"| {capture.name} | {name} | {found} | {off:.2f} | {without:.2f} |")
 
 
-def judge(result: Path, capture: Path, dye: Dye | None) -> tuple[bool, float, float]:
+def judge(results: Path | None, capture: Path, dye: Dye | None) -> tuple[bool, float, float]:
     """Return whether dye was found, and how far hues are off with and without what was found."""
     truth = read_truth(capture / "truth")
-    shown = read_prediction(result).in_order_of(truth)
-    masks = [Mask(truth.hair_mask(k), True) for k in range(len(shown.cameras))]
+    cameras, groom = truth.cameras, _true_groom(truth)
+    if results is not None:
+        shown = read_prediction(results / capture.name).in_order_of(truth)
+        cameras, groom = shown.cameras, shown.groom
+    masks = [Mask(truth.hair_mask(k), True) for k in range(len(cameras))]
     photos = truth.photos() or []
     if dye is not None:
         photos = [
             recolour(truth, *each, dye) for each in zip(truth.cameras, photos, masks, strict=True)
         ]
     views = [View(str(k), 0.0, photo) for k, photo in enumerate(photos)]
-    groom = replace(shown.groom, material=measure_colour(views, masks))
-    colours = find_dyes(groom, views, masks, shown.cameras)
+    groom = replace(groom, material=measure_colour(views, masks))
+    colours = find_dyes(groom, views, masks, cameras)
     plain = point_colours(groom)
     share, roots, places = _true(truth)
-    seen = _seen(groom, shown.cameras)
+    seen = _seen(groom, cameras)
     near = cKDTree(places).query(groom.strands.points[seen])[1]
     change = (dye or blue_streak)(share, roots)[near] * (dye is not None)
     had = plain if colours is None else colours
     return colours is not None, off(had[seen], change), off(plain[seen], change)
+
+
+def _true_groom(truth: Truth) -> Groom:
+    """Return the true head with some true strands."""
+    every = -(-len(truth.strands) // GUIDES)
+    strands = truth.strands.select(np.arange(0, len(truth.strands), every))
+    return Groom(strands, truth.head, *bind(strands.roots, truth.head))
 
 
 def _seen(groom: Groom, cameras: Sequence[Camera]) -> BoolArray:

@@ -100,9 +100,8 @@ class Brushing:
         A stroke goes no farther in depth than across, and at its own depth where nothing is.
         """
         on_hair = self.setting.group == "hair"
-        points = self.before.head.vertices
-        if on_hair:
-            points = self.hair.points[:, ::COARSER].reshape(-1, 3)
+        some = self.hair.points[:, ::COARSER].reshape(-1, 3)
+        points = some if on_hair else self.before.head.vertices
         for axis, at in enumerate(self._way[-1] if self._way else ()):  # not at hair elsewhere
             points = points[np.abs(points[:, axis] - at) < ASIDE]
         picked = nearest_point(camera, points.astype(np.float32), pixel)

@@ -51,6 +51,7 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
     "helices": ({"COUNT": 10}, []),
     "looks": ({"GUIDES": 60}, ["CAPTURES", "-o", "CAPTURES/looks.jpg"]),
     "masks": ({}, ["CAPTURES"]),
+    "dyed_hair": ({"GUIDES": 60, "HEIGHT": 160}, ["CAPTURES"]),
     "parting": ({"silhouette": KNOWN_TURN}, ["CAPTURES"]),
     "orientation": ({}, ["CAPTURES", "--only", "structure_tensor"]),
     "orientation_looks": (
