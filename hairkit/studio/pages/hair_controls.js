@@ -60,6 +60,7 @@ class HairControls {
       comb.setAttribute("aria-pressed", String(this.combing));
     });
     shake.addEventListener("click", () => { this.shaken = 0; });
+    for (const part of [comb, label, shake]) part.classList.add("motion");
     const made = element("div", { class: "controls" });
     made.append(comb, label, shake, ...(this.brush?.controls ?? []));
     return made;
