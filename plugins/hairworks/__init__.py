@@ -37,7 +37,7 @@ from .asset import ApxAsset
 from .from_groom import Layout, groom_to_asset
 from .kept import FORMAT as CARRIED
 from .kept import asset_carried_by, with_kept_values
-from .maps import scalp_maps
+from .maps import scalp_maps, widths
 from .reader import MAX_BYTES, read_apx
 from .schema import TEXTURES
 from .space import CENTIMETRES, RIGHT_HANDED, UP_AXIS
@@ -105,7 +105,8 @@ class Options:
         " else 100,000.",
     )
     maps: bool = option(
-        False, doc="Write maps of density, root and tip colours beside the file, where they vary."
+        False,
+        doc="Write maps of density, width, root and tip colour beside the file, where they vary.",
     )
     author: str = option("", doc="Author's name in the file.")
     head: Path | None = option(
@@ -116,8 +117,11 @@ class Options:
 @hookimpl
 def export_groom(groom: Groom, path: Path, options: Options) -> bool:
     """Write the groom's guides as .apx, and maps beside it where options say so."""
-    asset = exported_asset(groom, options)
     maps = scalp_maps(_chosen(groom, options)) if options.maps else {}
+    if "widthTexture" in maps:  # it makes strands thinner than the widest
+        widest = float(widths(_chosen(groom, options)).max())
+        groom = replace(groom, material=replace(groom.material, width=widest))
+    asset = exported_asset(groom, options)
     files = {name: f"{path.stem}_{name.removesuffix('Texture')}.tga" for name in maps}
     names = zip(TEXTURES, asset.textures, strict=True)
     text = asset_text(replace(asset, textures=tuple(files.get(name, kept) for name, kept in names)))

@@ -1,4 +1,4 @@
-"""Maps over the scalp, beside the .apx file: density, and colours of roots and tips."""
+"""Maps over the scalp, beside the .apx file: density, width, and colours of roots and tips."""
 
 from __future__ import annotations
 
@@ -18,7 +18,16 @@ EDGE = 256
 NEAREST = 4
 """Guides whose values a texel mixes, by their inverse distance."""
 LEAST = 1e-6
-"""Distance in texture coordinates that is divided by."""
+"""Distance in texture coordinates that is divided by, and least difference of widths, metres."""
+
+
+def widths(groom: Groom) -> Float32Array:
+    """Return the mean width (S,) of each strand, metres."""
+    strands, width = groom.strands, groom.material.width
+    if strands.widths is None or not len(strands):
+        return np.full(len(strands), width, np.float32)
+    sums = np.add.reduceat(strands.widths, strands.offsets[:-1])
+    return np.asarray(sums / strands.counts, np.float32)
 
 
 def scalp_maps(groom: Groom) -> dict[str, bytes]:
@@ -31,6 +40,9 @@ def scalp_maps(groom: Groom) -> dict[str, bytes]:
     if groom.head.density is not None:
         grey = np.rint(255 * groom.root_density).astype(np.uint8)
         maps["densityTexture"] = _map(uv, grey[:, None])
+    wide = widths(groom)
+    if np.ptp(wide) > LEAST:
+        maps["widthTexture"] = _map(uv, 255 * wide[:, None] / wide.max())
     if strands.colours is not None:
         shades = np.rint(255 * srgb_from_linear(np.clip(strands.colours, 0, 1)))
         maps["rootColorTexture"] = _map(uv, shades[strands.offsets[:-1]])

@@ -8,6 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from hairkit_plugins.hairworks.maps import widths
 from PIL import Image
 from rich_groom import rich_groom
 
@@ -17,7 +18,7 @@ from hairkit.grooming.prepare_export import complete_groom
 from hairkit.manager import Manager
 
 
-@pytest.mark.parametrize("name", ["density", "rootColor", "tipColor"])
+@pytest.mark.parametrize("name", ["density", "width", "rootColor", "tipColor"])
 def test_a_map_has_its_guides_values_where_they_are(name: str, tmp_path: Path) -> None:
     """The file names the picture; at a guide's texture coordinates is what the guide has."""
     groom, path = complete_groom(rich_groom()), tmp_path / "hair.apx"
@@ -30,6 +31,8 @@ def test_a_map_has_its_guides_values_where_they_are(name: str, tmp_path: Path) -
     assert strands.colours is not None
     ends = {"rootColor": strands.offsets[:-1], "tipColor": strands.offsets[1:] - 1}
     wanted = guides.root_density[:, None]
+    if name == "width":
+        wanted = widths(guides)[:, None] / widths(guides).max()
     if name in ends:
         wanted = srgb_from_linear(strands.colours[ends[name]])
     u, v = strands.root_uv.T * len(picture)
@@ -45,7 +48,7 @@ def test_a_groom_of_one_colour_and_density_has_no_maps(tmp_path: Path) -> None:
     plain = replace(
         groom,
         head=replace(groom.head, density=None),
-        strands=replace(groom.strands, colours=None),
+        strands=replace(groom.strands, colours=None, widths=None),
     )
     export("export_groom", "hairworks", {"maps": True}, groom=plain, path=tmp_path / "a.apx")
     export("export_groom", "hairworks", groom=groom, path=tmp_path / "b.apx")
