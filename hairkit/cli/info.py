@@ -130,7 +130,7 @@ def _groom(path: Path, args: argparse.Namespace) -> dict[str, Any]:
         "width_m": look.width,
         "has": [
             name
-            for name in ("widths", "root_uv", "group", "guide")
+            for name in ("widths", "root_uv", "group", "guide", "colours")
             if getattr(strands, name) is not None
         ],
         "root_colour": [round(float(c), 4) for c in look.root_colour],

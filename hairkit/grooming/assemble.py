@@ -93,6 +93,8 @@ def assemble_groom(
     if not cameras or (chosen is not None and (chosen.root_colour or chosen.tip_colour)):
         return groom
     colours = find_dyes(groom, views, masks, cameras)
+    if colours is not None:
+        _log.warning("the hair has several hues: it is dyed, or masks take something else for hair")
     return replace(groom, strands=replace(groom.strands, colours=colours))
 
 
