@@ -28,7 +28,7 @@ from hairkit.cameras.depth_raster import depth_behind, head_depth, point_depth
 from hairkit.colour import linear_from_srgb, srgb_from_linear
 from hairkit.evaluation.prediction import read_prediction
 from hairkit.evaluation.truth import Truth, read_truth
-from hairkit.grooming.photo_colours import find_dyes, measure_colour
+from hairkit.grooming.photo_colours import measure_colour, with_hues
 from hairkit.grooming.prepare_export import point_colours
 from hairkit.head_model.scalp import bind
 from hairkit.types.camera import Camera
@@ -93,8 +93,9 @@ def judge(results: Path | None, capture: Path, dye: Dye | None) -> tuple[bool, f
         ]
     views = [View(str(k), 0.0, photo) for k, photo in enumerate(photos)]
     groom = replace(groom, material=measure_colour(views, masks))
-    colours = find_dyes(groom, views, masks, cameras)
-    plain = point_colours(groom)
+    groom = with_hues(groom, views, masks, cameras)
+    colours = groom.strands.colours
+    plain = point_colours(replace(groom, strands=replace(groom.strands, colours=None)))
     share, roots, places = _true(truth)
     seen = _seen(groom, cameras)
     near = cKDTree(places).query(groom.strands.points[seen])[1]

@@ -10,7 +10,7 @@ import numpy as np
 
 from hairkit.arrays import BoolArray
 from hairkit.errors import InputError
-from hairkit.grooming.photo_colours import find_dyes, measure_colour
+from hairkit.grooming.photo_colours import measure_colour, with_hues
 from hairkit.types.camera import Camera
 from hairkit.types.capture import View
 from hairkit.types.chosen import ChosenHair
@@ -60,7 +60,7 @@ def assemble_groom(
     chosen
         Colours and width that the user chose; None means those of the photos.
     cameras
-        Those of the photos, by which dyed hair is found; without them hair has one colour.
+        Those of the photos, by which hues are measured along the strands.
 
     Raises
     ------
@@ -90,12 +90,13 @@ def assemble_groom(
         material,
         ties=() if tied is None else tuple(tail.tie for tail in tied.tails),
     )
-    if not cameras or (chosen is not None and (chosen.root_colour or chosen.tip_colour)):
+    if cameras:
+        groom = with_hues(groom, views, masks, cameras)
+    if chosen is None:
         return groom
-    colours = find_dyes(groom, views, masks, cameras)
-    if colours is not None:
-        _log.warning("the hair has several hues: it is dyed, or masks take something else for hair")
-    return replace(groom, strands=replace(groom.strands, colours=colours))
+    own = None if chosen.root_colour or chosen.tip_colour else groom.strands.colours
+    material = chosen.material(groom.material)
+    return replace(groom, material=material, strands=replace(groom.strands, colours=own))
 
 
 def _as_guides(strands: Strands, roots: Roots, kept: BoolArray, width: float) -> Strands:

@@ -1,5 +1,8 @@
 """Colours of hair from the photos: of root and tip, and of dyed streaks, tips and halves.
 
+Brightness is that of the pixels in the masks, hue that of points of the strands that photos show:
+what masks take for hair beside the strands, and skin that shows between them, gives it none.
+
 Light and shade change how bright hair is by a factor of four and more, but its hue hardly: over
 eight captures of one colour the logarithms of red, green and blue, less their mean, stay within
 `FROM` of the head's for all but a hundredth of the hair. So only hair of another hue is taken for
@@ -9,7 +12,9 @@ from hair in the light. Hues are medians over the photos that see a place, and o
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -36,8 +41,8 @@ straight hair more than of waves, whose locks shade each other; 1.6 where coils 
 
 DEPTH = 0.87
 """Power of the channels of a colour, over their mean, with which hair is drawn as colourful as it
-was photographed: the film curve of pictures deepens dark colours. On ten captures chroma is 1.00 of
-the photos' in the mean, and 0.10 off on a scale of logarithms; with 1 it is 1.13 and 0.14."""
+was photographed: the film curve of pictures deepens dark colours. On ten captures chroma is 0.97 of
+the photos' in the mean, and 0.09 off on a scale of logarithms."""
 
 DARKEST = 1e-4
 """Least brightness that is divided by."""
@@ -59,6 +64,7 @@ FROM, WHOLLY = 0.25, 0.45
 TELLING, LEAST = 0.4, 0.08
 """The least share of the places with such a difference on a head with dyed hair; cropped hair, of
 which skin shows, has 0.05, undyed captures of long hair 0.01."""
+_log = logging.getLogger("hairkit")
 _LUMA = np.array([0.2126, 0.7152, 0.0722])
 
 
@@ -70,6 +76,7 @@ def measure_colour(views: Sequence[View], masks: Sequence[Mask]) -> HairMaterial
     darker tips are tells little of their colour, since they hang in the shade: half of the
     difference to what is usual, on a scale of logarithms, is taken for the tips' own. Both together
     are then made as bright as the mean of all pixels, less the `LIGHT`, and paler by `DEPTH`.
+    `with_hues` gives it the hues along the strands.
     """
     crowns, tips, every = [], [], []
     for view, mask in zip(views, masks, strict=True):
@@ -103,19 +110,22 @@ def _hair_pixels(view: View, mask: Mask) -> Float64Array:
     return np.asarray(view.image[row[::every], column[::every]] / 255, np.float64)
 
 
-def find_dyes(
+def with_hues(
     groom: Groom, views: Sequence[View], masks: Sequence[Mask], cameras: Sequence[Camera]
-) -> Float32Array | None:
-    """Return linear RGB (P, 3) of the points of hair that is dyed; None where it has one hue.
+) -> Groom:
+    """Return the groom in the hues that the photos show along its strands, as bright as before.
+
+    The material has the medians over the inner and the outer halves of the strands. Hair of several
+    hues has a colour at every point.
 
     Parameters
     ----------
     groom
-        Strands on the head, with the colours of hair that is not dyed in its material.
+        Strands on the head, with a material that is as bright as the photos.
     views, masks, cameras
         The photos, where hair is on them, and their cameras.
     """
-    strands = groom.strands
+    strands, material = groom.strands, groom.material
     some = strands.select(np.arange(0, len(strands), -(-len(strands) // MEASURED)))
     places = some.resampled(STATIONS).points
     fine = some.resampled_by_length(STEP).points
@@ -127,14 +137,27 @@ def find_dyes(
     )
     seen = np.asarray(np.isfinite(logs[..., 0]).any(axis=0))
     if seen.sum() < NEIGHBOURS:
-        return None
+        return groom
     found = np.nanmedian(logs[:, seen], axis=0)
+    outer = (np.flatnonzero(seen) % STATIONS) >= STATIONS // 2
+    root, tip = (
+        _tinted(colour, _hue(np.median(found[part] if part.any() else found, axis=0)))
+        for colour, part in ((material.root_colour, ~outer), (material.tip_colour, outer))
+    )
+    groom = replace(groom, material=replace(material, root_colour=root, tip_colour=tip))
     tree = cKDTree(places[seen])
     hue = _hue(_smooth(tree, found, places[seen]))
     away = np.abs(hue - np.median(hue, axis=0)).max(axis=1)
     if (away > TELLING).mean() < LEAST:
-        return None
-    return _dyed(groom, tree, found)
+        return groom
+    _log.warning("the hair has several hues: it is dyed, or masks take something else for hair")
+    return replace(groom, strands=replace(strands, colours=_dyed(groom, tree, found)))
+
+
+def _tinted(colour: Float32Array, hue: Float64Array) -> Float32Array:
+    """Return a colour (3,) as bright as another, in a hue (3,)."""
+    tint = np.exp(DEPTH * hue)
+    return np.asarray(np.minimum(tint * colour.mean() / tint.mean(), 1), np.float32)
 
 
 def _measure(

@@ -8,7 +8,7 @@ import numpy as np
 
 from hairkit import Groom
 from hairkit.grooming.densify import densify
-from hairkit.grooming.photo_colours import find_dyes, measure_colour
+from hairkit.grooming.photo_colours import measure_colour, with_hues
 from hairkit.grooming.prepare_export import point_colours
 from hairkit.rendering.picture import draw_views
 from hairkit.testing import bristle_groom
@@ -54,7 +54,7 @@ def test_hair_of_one_colour_is_not_dyed() -> None:
     """Light, shade and the exposure of the photos change no hue."""
     for light in (1.0, 0.6):
         views, masks = photographed(PLAIN, light)
-        assert find_dyes(PLAIN, views, masks, CAMERAS) is None
+        assert with_hues(PLAIN, views, masks, CAMERAS).strands.colours is None
 
 
 def test_hair_of_two_hues_has_both() -> None:
@@ -62,7 +62,8 @@ def test_hair_of_two_hues_has_both() -> None:
     true = half_pink()
     views, masks = photographed(true)
     material = replace(measure_colour(views, masks), width=PLAIN.material.width)
-    found = find_dyes(replace(PLAIN, material=material), views, masks, CAMERAS)
+    groom = replace(PLAIN, material=material)
+    found = with_hues(groom, views, masks, CAMERAS).strands.colours
     assert found is not None
     x = PLAIN.strands.points[:, 0]
     assert true.strands.colours is not None
@@ -74,3 +75,30 @@ def test_hair_of_two_hues_has_both() -> None:
     hues, true_hues = (each - each.mean(axis=1, keepdims=True) for each in (had, wanted))
     between = np.abs(true_hues[0] - true_hues[1]).max()
     assert np.abs(hues - true_hues).max() < 0.5 * between  # grey light makes pink paler
+
+
+def test_the_hue_is_that_of_the_strands() -> None:
+    """What masks take for hair beside the strands, such as clothes, gives the hair no hue."""
+    views, masks = photographed(PLAIN)
+    painted = [
+        replace(view, image=np.where(aside(view), [20, 40, 250], view.image).astype(np.uint8))
+        for view in views
+    ]
+    wrong = [
+        Mask(np.where(aside(view)[..., 0], HAIR, mask.labels).astype(np.uint8), False)
+        for view, mask in zip(views, masks, strict=True)
+    ]
+    hues = []
+    for photos, marked in ((views, masks), (painted, wrong)):
+        groom = replace(PLAIN, material=measure_colour(photos, marked))
+        look = with_hues(groom, photos, marked, CAMERAS).material
+        hues.append(np.log(look.tip_colour / look.tip_colour.mean()))
+    assert np.abs(hues[0] - hues[1]).max() < 0.1
+    pixels = measure_colour(painted, wrong).tip_colour
+    assert np.abs(np.log(pixels / pixels.mean()) - hues[0]).max() > 0.5
+
+
+def aside(view: View) -> np.ndarray:
+    """Return (H, W, 1) the lowest quarter of a photo."""
+    low: np.ndarray = np.arange(len(view.image))[:, None, None] > 0.75 * len(view.image)
+    return low & np.ones((1, view.image.shape[1], 1), bool)
