@@ -240,18 +240,22 @@ def render(
     from hairkit.imaging.picture_file import write_picture
     from hairkit.rendering import draw
     from hairkit.rendering.framing import framing_cameras
-    from hairkit.simulation.posing import pose_groom, pose_hair
+    from hairkit.rendering.head import bust_solid
+    from hairkit.simulation.posing import pose_groom, pose_hair, pose_torso
 
-    shown = _open(groom, manager)
-    hair = densify(shown, hairs, seed)
+    shown, torso = _open(groom, manager), None
+    hair = rest = densify(shown, hairs, seed)
+    head = shown.head
     if cache is not None:
         motion = cache if isinstance(cache, PointCache) else PointCache.load(cache)
-        hair = pose_hair(shown, hair, motion, frame)
-        shown = pose_groom(shown, motion, frame)
+        hair = pose_hair(shown, rest, motion, frame)
+        torso, shown = pose_torso(shown, motion, frame), pose_groom(shown, motion, frame)
     if not isinstance(camera, Camera):
         points = np.concatenate([shown.head.vertices, hair.points])
         camera = framing_cameras(points, [_direction(camera)], *size)[0]
-    picture = draw(hair, shown.head, camera, material=shown.material, bust=True)
+    below = bust_solid(head, rest, torso)
+    solids = [] if below is None else [below]
+    picture = draw(hair, shown.head, camera, material=shown.material, solids=solids)
     if path is not None:
         write_picture(path, picture)
     return picture

@@ -20,9 +20,10 @@ from hairkit.imaging.picture_file import write_picture
 from hairkit.io.capture_reader import TURN
 from hairkit.manager import Manager
 from hairkit.pipeline.open_groom import load_groom
-from hairkit.rendering import Lights, draw_views
+from hairkit.rendering import Lights, Solid, draw_views
 from hairkit.rendering.framing import framing_cameras
-from hairkit.simulation.posing import pose_groom, pose_hair
+from hairkit.rendering.head import bust_solid
+from hairkit.simulation.posing import pose_groom, pose_hair, pose_torso
 from hairkit.types.camera import Camera
 from hairkit.types.groom import Groom
 from hairkit.types.point_cache import read_cache
@@ -69,7 +70,7 @@ def run(args: argparse.Namespace) -> int:
     check_target(args.output)
     check_range("--hairs", args.hairs, 1, MOST_HAIRS)
     check_range("--turntable", args.turntable, 1, MOST_PICTURES, "pictures")
-    groom, hair = _hair_and_head(args)
+    groom, hair, below = _hair_and_body(args)
     cameras = _cameras(args, groom.head.vertices, hair)
     paths = _paths(args.output, len(cameras))
     light = Lights.at_camera(cameras[0]) if len(cameras) > 1 else None
@@ -80,7 +81,7 @@ def run(args: argparse.Namespace) -> int:
             [camera],
             material=groom.material,
             lights=light,
-            bust=True,
+            solids=[] if below is None else [below],
             skin=SkinLook(args.lobe),
         )
         write_picture(path, picture)
@@ -89,8 +90,8 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _hair_and_head(args: argparse.Namespace) -> tuple[Groom, Strands]:
-    """Return the groom and full hair, at the frame of its simulation where one is given."""
+def _hair_and_body(args: argparse.Namespace) -> tuple[Groom, Strands, Solid | None]:
+    """Return groom, full hair and bust, at the frame of their simulation where one is given."""
     manager = Manager.loaded(args.plugin)
     reader = importer_of(manager, args.groom)
     settings = split_settings(manager, {"reader": reader}, args.set)
@@ -99,10 +100,11 @@ def _hair_and_head(args: argparse.Namespace) -> tuple[Groom, Strands]:
         raise InputError(f"--frame {args.frame} needs --cache with a simulation of the groom")
     hair = densify(groom, args.hairs, args.seed)
     if args.cache is None:
-        return groom, hair
+        return groom, hair, bust_solid(groom.head, hair)
     guides = groom.select(guide_mask(groom.strands))
     cache, frame = read_cache(args.cache, guides), args.frame or 0
-    return pose_groom(groom, cache, frame), pose_hair(groom, hair, cache, frame)
+    moved, posed = pose_hair(groom, hair, cache, frame), pose_groom(groom, cache, frame)
+    return posed, moved, bust_solid(groom.head, hair, pose_torso(groom, cache, frame))
 
 
 def _cameras(args: argparse.Namespace, head: Any, hair: Strands) -> list[Camera]:

@@ -10,7 +10,7 @@ from typing import Any
 import moderngl
 import numpy as np
 
-from hairkit.arrays import Float32Array, Int32Array
+from hairkit.arrays import Float32Array, Float64Array, Int32Array
 from hairkit.head_model.bust import CLOTH, bust_under
 from hairkit.rendering.context import Renderer
 from hairkit.rendering.gl_camera import DepthRange, set_camera, set_uniforms
@@ -77,13 +77,20 @@ def _neck(head: Head) -> Float32Array:
     return result
 
 
-def bust_solid(head: Head, strands: Strands | None = None) -> Solid | None:
-    """Return a clothed bust under a head that ends at its neck; None under other heads."""
+def bust_solid(
+    head: Head, strands: Strands | None = None, motion: Float64Array | None = None
+) -> Solid | None:
+    """Return a clothed bust under a head that ends at its neck; None under other heads.
+
+    Head and strands are at rest; `motion` (4, 4) moves the bust, None leaves it.
+    """
     bust = bust_under(head, strands)
     if bust is None:
         return None
+    move = (np.eye(4) if motion is None else motion).astype(np.float32)
+    vertices, normals = bust.vertices @ move[:3, :3].T + move[:3, 3], bust.normals @ move[:3, :3].T
     colours = np.tile(np.array(CLOTH, np.float32), (len(bust.vertices), 1))
-    return Solid(bust.vertices, bust.faces, bust.normals, colours, scatter=0.0)
+    return Solid(vertices, bust.faces, normals, colours, scatter=0.0)
 
 
 @contextlib.contextmanager

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hairkit.arrays import Float32Array
+from hairkit.arrays import Float32Array, Float64Array
 from hairkit.errors import InputError
 from hairkit.grooming.guide_weights import follow, guide_mask
 from hairkit.head_model.skinning import HEAD_JOINT, head_weights
@@ -21,16 +21,23 @@ from hairkit.types.strands import Strands
 def pose_groom(groom: Groom, cache: PointCache, frame: int) -> Groom:
     """Return the groom, hair and head, as it is at a frame of its simulation.
 
-    The head's vertices follow the head joint by their skin weights, so that the neck bends.
+    The head's vertices follow the head joint by their skin weights and else the torso, so that the
+    neck bends. Joints stay at rest: draw the bust with the head at rest and `pose_torso`.
     Negative frames count from the last. Raises `InputError` where the cache has no such frame or
     is of another groom.
     """
     strands = pose_hair(groom, groom.strands, cache, frame)
-    motion, rest = cache.head_from_rest[frame], groom.head.vertices
-    weight = head_weights(groom.head)[:, HEAD_JOINT, None]
-    moved = rest @ motion[:3, :3].T + motion[:3, 3]
-    vertices = (rest + weight * (moved - rest)).astype(np.float32)
+    rest, weight = groom.head.vertices, head_weights(groom.head)[:, HEAD_JOINT, None]
+    moved = transform_points(cache.head_from_rest[frame], rest)
+    below = transform_points(pose_torso(groom, cache, frame), rest)
+    vertices = (below + weight * (moved - below)).astype(np.float32)
     return replace(groom, strands=strands, head=replace(groom.head, vertices=vertices))
+
+
+def pose_torso(groom: Groom, cache: PointCache, frame: int) -> Float64Array:
+    """Return the motion (4, 4) of the torso since rest at a frame of the groom's simulation."""
+    joint = groom.head.joints[1].astype(np.float64)
+    return follow_head(np.eye(4), cache.head_from_rest[frame], joint)
 
 
 def pose_hair(groom: Groom, hair: Strands, cache: PointCache, frame: int) -> Strands:

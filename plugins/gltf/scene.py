@@ -12,6 +12,7 @@ from hairkit.grooming.prepare_export import PreparedGroom
 from hairkit.head_model.bust import bust_under
 from hairkit.head_model.skinning import HEAD_JOINT, JOINT_NAMES, JOINT_PARENTS
 from hairkit.io.glb_document import Document
+from hairkit.simulation.rigid_motion import inverse_motion, torso_under
 from hairkit.types.groom import Groom
 
 from .baking import Baked, bake
@@ -81,7 +82,7 @@ def _bake(ready: PreparedGroom, options: Options) -> Baked | None:
 def _scene(
     document: Document, groom: Groom, parts: list[tuple[str, int]], level: int, morphs: int
 ) -> tuple[int, list[int]]:
-    """Add a scene with a skeleton of its own; return its head joint and the nodes that morph.
+    """Add a scene with a skeleton of its own; return its root joint and the nodes that morph.
 
     Scenes share no node: a node has one place in three.js, and skins must lie in their scene.
     """
@@ -100,7 +101,7 @@ def _scene(
         nodes.append(node)
     document.add("scenes", name=f"LOD{level}", nodes=[numbers[0], *at_top])
     moving = [node for node, (name, _) in zip(nodes, parts, strict=True) if name not in BODY]
-    return numbers[HEAD_JOINT], moving if morphs else []
+    return numbers[0], moving if morphs else []
 
 
 def _back(offsets: Float64Array) -> list[float]:
@@ -116,34 +117,42 @@ def _animate(
 ) -> None:
     """Add one animation that moves all scenes alike."""
     times = document.accessor(baked.times, None, bounds=True)
-    place, turn = _head_track(groom, baked.head_from_rest)
-    tracks: list[tuple[str, Float32Array]] = [("translation", place), ("rotation", turn)]
+    tracks = _joint_tracks(groom, baked.head_from_rest)
     if len(baked.shapes):
-        tracks.append(("weights", baked.weights.reshape(-1)))
+        tracks.append((0, "weights", baked.weights.reshape(-1)))
     samplers = [
         {"input": times, "interpolation": "LINEAR", "output": document.accessor(values, None)}
-        for _, values in tracks
+        for _, _, values in tracks
     ]
     channels = [
         {"sampler": sampler, "target": {"node": node, "path": path}}
-        for head, moving in animated
-        for sampler, (path, _) in enumerate(tracks)
-        for node in (moving if path == "weights" else [head])
+        for root, moving in animated
+        for sampler, (joint, path, _) in enumerate(tracks)
+        for node in (moving if path == "weights" else [root + joint])
     ]
     document.add("animations", name="simulation", samplers=samplers, channels=channels)
 
 
-def _head_track(groom: Groom, motion: Float64Array) -> tuple[Float32Array, Float32Array]:
-    """Return translations (T, 3) and rotations (T, 4) of the head joint on a still neck."""
+def _joint_tracks(groom: Groom, motion: Float64Array) -> list[tuple[int, str, Float32Array]]:
+    """Return translations (T, 3) and rotations (T, 4) of the root and head joints.
+
+    The torso goes with the root, on which the neck's joint keeps still.
+    """
     from scipy.spatial.transform import Rotation
 
-    _, neck, head = groom.head.joints.astype(np.float64)
-    place = motion[:, :3, :3] @ head + motion[:, :3, 3] - neck
-    turn = Rotation.from_matrix(motion[:, :3, :3]).as_quat()
-    # the shorter way from key to key: q and -q are the same rotation
-    jump = (turn[1:] * turn[:-1]).sum(axis=1) < 0
-    turn[1:] *= np.where(np.cumsum(jump) % 2, -1.0, 1.0)[:, None]
-    return place.astype(np.float32), turn.astype(np.float32)
+    root, neck, head = groom.head.joints.astype(np.float64)
+    torso = torso_under(motion, neck)
+    against = inverse_motion(torso) @ motion
+    tracks: list[tuple[int, str, Float32Array]] = []
+    for joint, moved, rest in ((0, torso, root), (HEAD_JOINT, against, head)):
+        place = moved[:, :3, :3] @ rest + moved[:, :3, 3] - (neck if joint else 0.0)
+        turn = Rotation.from_matrix(moved[:, :3, :3]).as_quat()
+        # the shorter way from key to key: q and -q are the same rotation
+        jump = (turn[1:] * turn[:-1]).sum(axis=1) < 0
+        turn[1:] *= np.where(np.cumsum(jump) % 2, -1.0, 1.0)[:, None]
+        tracks.append((joint, "translation", place.astype(np.float32)))
+        tracks.append((joint, "rotation", turn.astype(np.float32)))
+    return tracks
 
 
 def _hair_material(document: Document, groom: Groom, options: Options) -> int:

@@ -8,12 +8,18 @@ import numpy as np
 import pytest
 from rich_groom import rich_groom
 
+import hairkit
 from hairkit.errors import InputError
 from hairkit.grooming.densify import densify
 from hairkit.grooming.guide_weights import guide_mask
+from hairkit.head_model.template import default_head
+from hairkit.rendering.framing import framing_cameras
+from hairkit.rendering.head import bust_solid
+from hairkit.simulation.motion import turn_about
 from hairkit.simulation.obstacles import groom_bodies
-from hairkit.simulation.posing import pose_groom, pose_hair
-from hairkit.simulation.rigid_motion import transform_points
+from hairkit.simulation.posing import pose_groom, pose_hair, pose_torso
+from hairkit.simulation.rigid_motion import inverse_motion, transform_points
+from hairkit.synth import grow
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom
 from hairkit.types.point_cache import PointCache
@@ -63,6 +69,42 @@ def test_hair_that_follows_keeps_its_length_and_out_of_the_head() -> None:
     inner = (bodies.at(hair.points)[0] > 0.001) & made[hair.strand_of_point]
     assert bodies.at(aside)[0].min() < -0.005
     assert bodies.at(posed.points)[0][inner].min() > -0.0025
+
+
+def test_neck_and_shoulders_jump_with_the_head() -> None:
+    """A head that is only moved takes neck and bust along; one that nods leaves the bust."""
+    groom = grow("straight", default_head(), 20, 0)
+    cache, jump = still(groom), np.array([0.1, 0.15, -0.2])
+    motion = np.eye(4)
+    motion[:3, 3] = jump
+    moved = replace(cache, head_from_rest=np.stack([np.eye(4), motion]))
+    shown, torso = pose_groom(groom, moved, 1), pose_torso(groom, moved, 1)
+    assert np.abs(shown.head.vertices - groom.head.vertices - jump).max() < 1e-6
+    rest, bust = bust_solid(groom.head), bust_solid(groom.head, motion=torso)
+    assert rest is not None
+    assert bust is not None
+    assert np.abs(bust.vertices - rest.vertices - jump).max() < 1e-6
+    nod = turn_about(groom.head.joints[1].astype(np.float64), ("pitch", 0.5))
+    nods = replace(cache, head_from_rest=np.stack([np.eye(4), nod]))
+    np.testing.assert_array_equal(pose_torso(groom, nods, 1), np.eye(4))
+
+
+def test_a_jump_seen_by_a_camera_that_jumps_is_the_still_picture() -> None:
+    """Head, neck, shoulders and hair go along as one."""
+    groom = grow("straight", default_head(), 20, 0)
+    motion = np.eye(4)
+    motion[:3, 3] = [0.1, 0.15, -0.2]
+    points = np.stack([groom.strands.points, transform_points(motion, groom.strands.points)])
+    heads = np.stack([np.eye(4), motion])
+    cache = PointCache(points.astype(np.float32), np.arange(2) / 60, heads)
+    near = np.concatenate([groom.head.vertices, groom.strands.points])
+    [camera] = framing_cameras(near, [(25.0, 5.0)], 96, 96)
+    along = replace(camera, camera_from_head=camera.camera_from_head @ inverse_motion(motion))
+    first, second = (
+        hairkit.render(groom, camera=view, hairs=300, cache=cache, frame=frame).astype(float)
+        for frame, view in enumerate((camera, along))
+    )
+    assert np.abs(first - second).mean() < 0.5
 
 
 def test_another_grooms_cache_is_refused() -> None:

@@ -16,10 +16,14 @@ from hairkit_plugins import gltf
 
 from hairkit.errors import FormatError, InputError
 from hairkit.grooming.prepare_export import complete_groom
+from hairkit.head_model.bust import bust_under
+from hairkit.head_model.template import default_head
 from hairkit.io.glb_file import GlbFile
 from hairkit.io.glb_motion import read_head_motion
 from hairkit.io.head_reader import read_head
 from hairkit.io.polylines import join_segments
+from hairkit.simulation.motion import turn_about
+from hairkit.synth import grow
 from hairkit.testing import ball_head, bristle_groom
 from hairkit.types.groom import Groom, HairMaterial, HairPhysics
 from hairkit.types.point_cache import PointCache
@@ -226,6 +230,22 @@ def test_every_client_plays_the_cache_at_every_frame(
             np.testing.assert_allclose(lines, points, atol=1e-4)
             np.testing.assert_allclose(hair.reshape(-1, 2, 3).mean(axis=1), points, atol=1e-4)
             np.testing.assert_allclose(head[top], skin[top], atol=1e-5)
+
+
+def test_the_bust_goes_where_the_head_goes(tmp_path: Path) -> None:
+    """A head that jumps takes the torso along; one that turns about the neck does not."""
+    groom = grow("straight", default_head(), 20, 0)
+    cache, joint = swinging(groom, 4, np.ones(1)), groom.head.joints[1].astype(np.float64)
+    motion = np.stack([turn_about(joint, ("yaw", 0.3 * frame)) for frame in range(4)])
+    jump = np.array([0.1, 0.15, -0.2])
+    motion[2:, :3, 3] += jump
+    replace(cache, head_from_rest=motion).save(tmp_path / "cache.npz")
+    path = written(tmp_path, groom, animation="skin", strips=5, cache=tmp_path / "cache.npz")
+    player, bust = GltfPlayer(path), bust_under(groom.head, groom.strands)
+    assert bust is not None
+    for time, shift in zip(player.times, [0, 0, 1, 1], strict=True):
+        places = player.mesh("torso", time, "three") - bust.vertices
+        np.testing.assert_allclose(places - shift * jump, 0, atol=1e-6)
 
 
 def test_fewer_shapes_than_the_motion_needs_are_told(
