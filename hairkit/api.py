@@ -253,8 +253,7 @@ def render(
     if not isinstance(camera, Camera):
         points = np.concatenate([shown.head.vertices, hair.points])
         camera = framing_cameras(points, [_direction(camera)], *size)[0]
-    below = bust_solid(head, rest, torso)
-    solids = [] if below is None else [below]
+    solids = [below] if (below := bust_solid(head, rest, torso)) else []
     picture = draw(hair, shown.head, camera, material=shown.material, solids=solids)
     if path is not None:
         write_picture(path, picture)

@@ -21,8 +21,7 @@ from hairkit.types.strands import Strands
 def pose_groom(groom: Groom, cache: PointCache, frame: int) -> Groom:
     """Return the groom, hair and head, as it is at a frame of its simulation.
 
-    The head's vertices follow the head joint by their skin weights and else the torso, so that the
-    neck bends. Joints stay at rest: draw the bust with the head at rest and `pose_torso`.
+    The head's vertices follow head and torso by their skin weights: the neck bends. Joints stay.
     Negative frames count from the last. Raises `InputError` where the cache has no such frame or
     is of another groom.
     """

@@ -112,14 +112,6 @@ def follow_head(torso: Float64Array, head: Float64Array, joint: Float64Array) ->
     return torso if np.abs(result - torso).max() <= 1e-12 else result
 
 
-def torso_under(heads: Float64Array, joint: Float64Array) -> Float64Array:
-    """Return motions (T, 4, 4) of the torso since rest, each as the head's alone (T, 4, 4) has it.
-
-    That is what files and pictures show, whose frames stand for themselves.
-    """
-    return np.stack([follow_head(_IDENTITY, head, joint) for head in heads])
-
-
 def _along_screw(start: Float64Array, end: Float64Array, share: Float64Array) -> Float64Array:
     """Return the motions (N, 4, 4) at fractions `share` (N,) of the way."""
     cross, angle = _axis_and_angle(end[:3, :3] @ start[:3, :3].T)

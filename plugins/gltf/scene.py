@@ -12,7 +12,7 @@ from hairkit.grooming.prepare_export import PreparedGroom
 from hairkit.head_model.bust import bust_under
 from hairkit.head_model.skinning import HEAD_JOINT, JOINT_NAMES, JOINT_PARENTS
 from hairkit.io.glb_document import Document
-from hairkit.simulation.rigid_motion import inverse_motion, torso_under
+from hairkit.simulation.rigid_motion import follow_head, inverse_motion
 from hairkit.types.groom import Groom
 
 from .baking import Baked, bake
@@ -134,14 +134,11 @@ def _animate(
 
 
 def _joint_tracks(groom: Groom, motion: Float64Array) -> list[tuple[int, str, Float32Array]]:
-    """Return translations (T, 3) and rotations (T, 4) of the root and head joints.
-
-    The torso goes with the root, on which the neck's joint keeps still.
-    """
+    """Return translations (T, 3) and rotations (T, 4) of torso, the root joint, and head on it."""
     from scipy.spatial.transform import Rotation
 
     root, neck, head = groom.head.joints.astype(np.float64)
-    torso = torso_under(motion, neck)
+    torso = np.stack([follow_head(np.eye(4), moved, neck) for moved in motion])
     against = inverse_motion(torso) @ motion
     tracks: list[tuple[int, str, Float32Array]] = []
     for joint, moved, rest in ((0, torso, root), (HEAD_JOINT, against, head)):
