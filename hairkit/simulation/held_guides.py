@@ -49,6 +49,23 @@ def pull_to_captured(
     return np.where(arc / total < held[:, None], HELD, pull)
 
 
+def borne_masses(
+    points: Float64Array, length: Float64Array, mass: Float64Array, held: Float64Array
+) -> Float64Array:
+    """Return the mass (S, n) whose weight hair beneath or the head bears at each node at rest, kg.
+
+    Where a strand lies, what is beneath bears it and what hangs from it; a tied one is not borne.
+    """
+    falls = np.pad(-np.diff(points[..., 1], axis=1) / length, ((0, 0), (1, 1)), "edge")
+    lies = np.clip(1 - 0.5 * (falls[:, 1:] + falls[:, :-1]), 0.0, 1.0) * (held == 0)[:, None]
+    borne, hanging = np.zeros_like(mass), np.zeros(len(mass))
+    for node in range(mass.shape[1] - 1, 0, -1):
+        hanging = hanging + mass[:, node]
+        borne[:, node] = lies[:, node] * hanging
+        hanging = hanging - borne[:, node]
+    return borne
+
+
 def held_lengths(groom: Groom) -> Float64Array:
     """Return the way (S,) of every strand from its root to its tie, metres; 0 of loose strands.
 

@@ -10,6 +10,7 @@ from hairkit.arrays import Float64Array
 from hairkit.simulation import Surroundings
 from hairkit.simulation.guide_simulator import FRAME
 from hairkit.simulation.hair_grid import make_hair_grid
+from hairkit.simulation.held_guides import borne_masses
 from hairkit.simulation.node_simulator import NodeSimulator
 from hairkit.simulation.rigid_motion import inverse_motion
 from hairkit.simulation.substeps import Course, StepArrays
@@ -20,7 +21,7 @@ from .block import Contact, acting, state_of
 from .limits import max_stiffness, overhang
 from .linear_system import Rates, System, assemble
 from .options import Options
-from .rods import Rods, State, balance_load, clamp_roots, elastic_energy, make_rods
+from .rods import TINY, Rods, State, balance_load, clamp_roots, elastic_energy, make_rods
 
 SINGLE_HAIR = 1.2e-3
 """m^4/s^2: EI over mass per length of a hair of 80 micrometres, 4 GPa."""
@@ -53,9 +54,10 @@ class RodSimulator(NodeSimulator):
         return now.position, now.velocity, now.frames
 
     def _elastic(self, place: Float64Array) -> float:
-        """Return the energy of bending, twist and the pull to the captured shape."""
+        """Return the energy of bending, twist, the pull to the captured shape, and the support."""
         frames = self._engine.state.frames
-        return elastic_energy(self.rods, place, frames, self._pull) - self._rest_energy
+        raised = float((self._borne[..., None] * (place - self._nodes) @ self._rest_gravity).sum())
+        return elastic_energy(self.rods, place, frames, self._pull) - self._rest_energy + raised
 
     def _build(self, near: Float64Array) -> None:
         """Make the rods and their engine."""
@@ -75,7 +77,7 @@ class RodSimulator(NodeSimulator):
         return Engine(self.rods, contact, np.float64 if exact else np.float32)
 
     def _stiffen(self, options: Options) -> Rods:
-        """Return the rods, whose natural shape balances gravity at the captured shape."""
+        """Return the rods, whose natural shape balances what weight nothing else bears."""
         density = self._density
         most = max_stiffness(self._nodes, FRAME / options.substeps)[:, None]
         weight = abs(self._groom.physics.gravity) * overhang(self._nodes)[:, None]
@@ -83,8 +85,9 @@ class RodSimulator(NodeSimulator):
         firm = np.maximum(SINGLE_HAIR * 10.0 ** (options.bend or 0.0), borne)
         bending = density * np.minimum(firm, most)
         rods = make_rods(self._nodes, density, bending, bending * options.twist)
-        load = rods.mass[..., None] * self._rest_gravity
-        return balance_load(clamp_roots(rods, load), load)
+        self._borne = borne_masses(self._nodes, rods.length, rods.mass, self._held)
+        load, borne = (m[..., None] * self._rest_gravity for m in (rods.mass, self._borne))
+        return balance_load(clamp_roots(rods, load), load - borne)
 
     def _assemble(self, step: float, held: tuple[int, ...]) -> System:
         """Return the system of substeps in which some points are held."""
@@ -102,5 +105,21 @@ class RodSimulator(NodeSimulator):
             self._hair_grid.mix(now.position, now.velocity, engine.mass, change, rates)
         held = tuple(self._hands)
         system = self._system(round(seconds, 12), held)
-        force = self.rods.mass[..., None] * self._drawn_by_hands(end) if held else None
+        force = self._support(steps, seconds * len(steps.turn), head)
+        if held:
+            force += self.rods.mass[..., None] * self._drawn_by_hands(end)
         engine.run(system, steps, acting(self.rods, self._air(around, start), force))
+
+    def _support(self, steps: StepArrays, seconds: float, head: Course) -> Float64Array:
+        """Return the force (S, n, 3) of what bears hair, N, head axes: it pushes and never pulls.
+
+        Hair is pressed on it by gravity less the root's acceleration, along gravity at rest.
+        """
+        (start, end), (_, velocity, _) = head, self._now_by_strands()
+        before = velocity[:, 0] @ start[:3, :3].T @ end[:3, :3]
+        drift, rest = steps.drift[-1], self._rest_gravity
+        after = self._nodes[:, 0] @ drift[:, :3].T + drift[:, 3]
+        pressed = (steps.air[-1, :, 3] - (after - before) / seconds) @ rest
+        share = np.maximum(pressed / max(rest @ rest, TINY), 0.0)
+        force: Float64Array = -(self._borne * share[:, None])[..., None] * rest
+        return force

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from hairkit.manager import Manager
 from hairkit.simulation import Surroundings
-from hairkit.simulation.held_guides import held_lengths
+from hairkit.simulation.held_guides import borne_masses, held_lengths
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom
 from hairkit.types.strands import PLANTED, Strands
@@ -44,6 +44,35 @@ def test_strands_are_held_up_to_their_ring() -> None:
     assert held[:5] == pytest.approx(way[:5], abs=0.006)
     assert held[5] == 0
     assert not held_lengths(replace(groom, ties=())).any()
+
+
+@pytest.mark.parametrize(("level", "borne"), [(0, 0.0), (8, 1.0), (15, 1.0)])
+def test_what_a_strand_lies_on_bears_what_hangs_from_it(level: int, borne: float) -> None:
+    """A strand lies with its first segments and hangs with the others: all its weight is borne.
+
+    None is where it only hangs, and none at nodes that hang beyond the bend.
+    """
+    way = np.where(np.arange(15)[:, None] < level, [0.01, 0.0, 0.0], [0.0, -0.01, 0.0])
+    points = np.concatenate([np.zeros((1, 3)), np.cumsum(way, axis=0)])[None]
+    mass, loose = np.arange(1.0, 17.0)[None], np.zeros(1)
+    found = borne_masses(points, np.full((1, 15), 0.01), mass, loose)
+    assert found.sum() == pytest.approx(borne * mass[:, 1:].sum(), abs=1e-9)
+    assert found[:, level + 1 :].max(initial=0.0) < 1e-9
+    assert not borne_masses(points, np.full((1, 15), 0.01), mass, loose + 0.1).any()
+
+
+def test_hair_that_lies_goes_up_and_down_with_the_head() -> None:
+    """What bears level hair lifts it and falls with it, at up to 0.6 g, and does not throw it."""
+    groom = replace(ponytail(), ties=())
+    simulator = Manager.loaded().call("make_simulator", "rods", groom=groom)
+    farthest, head = 0.0, np.eye(4)
+    for frame in range(1, 61):
+        head[1, 3] = 0.075 * np.sin(np.pi * frame / 30) ** 2
+        simulator.advance(1 / 60, Surroundings(head.copy()))
+        seen = simulator.points - head[:3, 3]
+        farthest = max(farthest, float(np.abs(seen - groom.strands.points).max()))
+
+    assert farthest < 0.012
 
 
 @pytest.mark.parametrize("name", ["pbd", "rods", "super_helix"])

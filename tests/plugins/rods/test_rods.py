@@ -200,12 +200,12 @@ def test_a_grab_of_no_point_is_told(groom: Groom, point: int) -> None:
 
 
 def test_more_stiffness_moves_less(groom: Groom) -> None:
-    """Wind blows hair less far the stiffer it is, by either option."""
+    """Wind blows hair less far the stiffer it is, by either option, once it has settled."""
     around = Surroundings(wind=np.array([4.0, 0.0, 0.0]))
 
     def blown(**options: float) -> float:
         simulator = RodSimulator(groom, Options(**options))
-        for _ in range(30):
+        for _ in range(60):
             simulator.advance(1 / 60, around)
         return float(np.linalg.norm(simulator.points - groom.strands.points, axis=1).mean())
 
