@@ -51,10 +51,12 @@ class Edit(Stored):
     """One stroke of a brush."""
 
     path: Float32Array
-    """(N, 3) where the brush went, metres, head frame; (0, 3) reaches all hair."""
+    """(N, 3) where the brush went, metres, head frame; an empty one reaches all hair."""
     setting: Brush
 
     def __post_init__(self) -> None:
+        if not len(self.path):
+            object.__setattr__(self, "path", np.zeros((0, 3)))
         path = freeze(self, "path", np.float32, (None, 3), "path of a stroke")
         if len(path) > MOST_POINTS or not np.isfinite(path).all():
             raise DataError(f"path of a stroke: expected at most {MOST_POINTS} finite points")

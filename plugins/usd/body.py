@@ -11,7 +11,7 @@ from hairkit.grooming.prepare_export import PreparedGroom
 from hairkit.head_model.bust import bust_under
 from hairkit.head_model.skinning import JOINT_NAMES, head_weights
 from hairkit.io.coordinate_space import FileSpace
-from hairkit.types.groom import Groom
+from hairkit.simulation.rigid_motion import follow_head
 from hairkit.types.head import Head
 from hairkit.types.point_cache import PointCache
 
@@ -80,14 +80,23 @@ def add_head(stage: Any, head: Head, space: FileSpace, skeleton: Any, material: 
     UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
 
 
-def add_bust(stage: Any, groom: Groom, space: FileSpace, material: Any) -> None:
-    """Add the bust under a head that ends at its neck; it keeps still."""
-    from pxr import UsdShade
+def add_bust(
+    stage: Any, ready: PreparedGroom, space: FileSpace, material: Any, codes: list[float]
+) -> None:
+    """Add the bust under a head that ends at its neck; it hangs on the joint of the neck."""
+    from pxr import Gf, UsdShade
 
-    bust = bust_under(groom.head, groom.strands)
-    if bust is not None:
-        mesh = _add_mesh(stage, "/Groom/Torso", bust.vertices, bust.faces, bust.normals, space)
-        UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
+    head, cache = ready.groom.head, ready.cache
+    bust = bust_under(head, ready.groom.strands)
+    if bust is None:
+        return
+    mesh = _add_mesh(stage, "/Groom/Torso", bust.vertices, bust.faces, bust.normals, space)
+    UsdShade.MaterialBindingAPI.Apply(mesh.GetPrim()).Bind(material)
+    if cache is not None:
+        joint, place = head.joints[1].astype(np.float64), mesh.AddTransformOp()
+        torso = np.stack([follow_head(np.eye(4), move, joint) for move in cache.head_from_rest])
+        for code, moved in zip(codes, space.transform_to_file(torso), strict=True):
+            place.Set(Gf.Matrix4d(*moved.T.ravel().tolist()), code)
 
 
 def _add_mesh(

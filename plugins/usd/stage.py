@@ -101,7 +101,7 @@ def _fill(
     if options.head_mesh:
         add_head(stage, ready.groom.head, space, skeleton, materials.skin)
         if options.bust:
-            add_bust(stage, ready.groom, space, materials.cloth)
+            add_bust(stage, ready, space, materials.cloth, time_codes(ready))
     add_hair(
         stage,
         ready,

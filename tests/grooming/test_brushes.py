@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -154,3 +155,19 @@ def test_edits_are_kept_in_a_file(tmp_path: Path) -> None:
         read_edits(path)
     with pytest.raises(InputError, match="no brush 'combb'"):
         edit_groom(GROOM, Edits((Edit(np.eye(3), Brush("combb")),)))
+
+
+@pytest.mark.parametrize("page", ["touching_up.md", "tutorials/batch.md"])
+def test_the_scripts_of_the_docs_run(
+    page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What they show trims the hair of the files that they name."""
+    text = (Path(__file__).parents[2] / "docs" / page).read_text()
+    [script] = [each for each in re.findall("```python\n(.*?)```", text, re.S) if "trim" in each]
+    monkeypatch.chdir(tmp_path)
+    for folder in ("out", "results/anna"):
+        (tmp_path / folder).mkdir(parents=True)
+        GROOM.save(tmp_path / folder / "groom.npz")
+    exec(script.replace("0.03", "0.01"), {})
+    [made] = tmp_path.rglob("short.npz")
+    assert Groom.load(made).strands.lengths().max() < 0.01 + 1e-6

@@ -21,6 +21,7 @@ navigator.mediaDevices.getUserMedia = async (wanted) => {
 };"""
 """What is spoken is written down, since browsers without a sound card say nothing, and what the
 camera sends is kept."""
+REFUSED = 401
 LIVE = "() => window.streams.flatMap((s) => s.getTracks()).some((t) => t.readyState === 'live')"
 
 
@@ -34,12 +35,14 @@ def opened(browser: Any, server: Any) -> Iterator[Any]:
     page.on("pageerror", lambda error: page.trouble.append(str(error)))
     page.on("console", lambda m: m.type == "error" and page.trouble.append(m.text))
     own = (server.origin, "blob:", "data:")
+    page.on("response", lambda r: r.status == REFUSED and page.trouble.append(r.url))
     page.on("request", lambda r: r.url.startswith(own) or foreign.append(r.url))
     page.add_init_script(LISTEN)
     page.goto(server.link)
     try:
         yield page
     finally:
+        page.close()  # before its cookies: requests on their way are refused without them
         context.close()
     assert page.trouble == [], page.trouble
     assert foreign == []

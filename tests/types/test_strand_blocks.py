@@ -5,7 +5,7 @@ import pytest
 from rich_groom import rich_groom
 
 from hairkit.grooming.prepare_export import point_colours
-from hairkit.io import strand_blocks
+from hairkit.types import strand_blocks
 from hairkit.types.strand_blocks import blocks, bounds, colours, shares
 from hairkit.types.strands import Strands
 
@@ -49,7 +49,7 @@ def test_a_profile_has_no_more_rows_than_counts_ask_for() -> None:
 def test_blocks_of_a_profile_are_the_profile() -> None:
     """Colours taken block by block are those of all points, as a function of rows is."""
     groom = rich_groom()
-    shades = colours(groom.material, groom.strands.counts)
+    shades = colours(groom.material, groom.strands)
     parts = [shades.at(slice(start, start + 7)) for start in range(0, len(groom.strands), 7)]
     np.testing.assert_array_equal(np.concatenate(parts), point_colours(groom))
     doubled = shades.mapped(lambda rows: 2 * rows).at()

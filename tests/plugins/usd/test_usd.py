@@ -16,8 +16,10 @@ from hairkit.arrays import Float64Array
 from hairkit.errors import InputError, MissingExtraError
 from hairkit.grooming.prepare_export import complete_groom, dense_groom
 from hairkit.head_model.skinning import head_weights
+from hairkit.head_model.template import default_head
 from hairkit.manager import Manager
 from hairkit.storage import to_arrays
+from hairkit.synth import grow
 from hairkit.testing import bristle_groom
 from hairkit.types.groom import Groom, HairMaterial, HairPhysics
 from hairkit.types.point_cache import PointCache
@@ -228,6 +230,23 @@ def test_skin_and_hair_move_as_the_cache(manager: Manager, tmp_path: Path, axis:
         move = cache.head_from_rest[frame]
         wanted = groom.head.vertices @ move[:3, :3].T + move[:3, 3]
         np.testing.assert_allclose(space.points_to_head(np.array(points)), wanted, atol=2e-6)
+
+
+def test_the_bust_hangs_on_the_neck(manager: Manager, tmp_path: Path) -> None:
+    """In every frame the bust has a rigid motion that leaves the neck's joint on the head."""
+    from pxr import UsdGeom
+
+    groom = grow("straight", default_head(), 20, 0)
+    space = manager.options("usd", {"axis": "z_up_centimetres"}).space
+    stage = opened(exported(manager, groom, tmp_path, animated=True, axis="z_up_centimetres"))
+    torso, cache = UsdGeom.Mesh(stage.GetPrimAtPath("/Groom/Torso")), turning(groom)
+    joint = groom.head.joints[1].astype(np.float64)
+    codes = torso.GetOrderedXformOps()[0].GetTimeSamples()
+    for code, motion in zip(codes, cache.head_from_rest, strict=True):
+        move = np.array(torso.GetLocalTransformation(code))
+        placed = space.points_to_file(joint[None]) @ move[:3, :3] + move[3, :3]
+        wanted = motion[:3, :3] @ joint + motion[:3, 3]
+        np.testing.assert_allclose(space.points_to_head(placed)[0], wanted, atol=1e-6)
 
 
 def test_still_hair_follows_the_head_joint(manager: Manager, tmp_path: Path) -> None:
