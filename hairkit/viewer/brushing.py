@@ -16,8 +16,8 @@ from hairkit.types.groom import Groom
 from hairkit.viewer.picking import nearest_point
 
 NAMES = ("none", *BRUSHES)
-COARSER = 2
-"""Of so many points of a strand one is looked for under the brush."""
+LOOKED_AT = 40_000
+"""Points of guides, evenly, of which the one under the brush is looked for."""
 ASIDE = 0.06
 """Metres from a place of the brush within which the next one is on hair that is seen."""
 
@@ -100,8 +100,8 @@ class Brushing:
         A stroke goes no farther in depth than across, and at its own depth where nothing is.
         """
         on_hair = self.setting.group == "hair"
-        some = self.hair.points[:, ::COARSER].reshape(-1, 3)
-        points = some if on_hair else self.before.head.vertices
+        every = self.hair.points.reshape(-1, 3)
+        points = every[:: 1 + len(every) // LOOKED_AT] if on_hair else self.before.head.vertices
         for axis, at in enumerate(self._way[-1] if self._way else ()):  # not at hair elsewhere
             points = points[np.abs(points[:, axis] - at) < ASIDE]
         picked = nearest_point(camera, points.astype(np.float32), pixel)
