@@ -42,7 +42,6 @@ def opened(browser: Any, server: Any) -> Iterator[Any]:
     try:
         yield page
     finally:
-        page.close()  # before its cookies: requests on their way are refused without them
         context.close()
     assert page.trouble == [], page.trouble
     assert foreign == []

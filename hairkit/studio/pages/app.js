@@ -8,7 +8,7 @@ import * as strands from "./strands.js";
 import * as hair from "./hair.js";
 
 const pages = { photos, capture, annotate, pose, strands, hair };
-let leave = () => {};
+let leave = () => {}, ready = false; // with a session, without which pages are refused
 
 function show() {
   const [name, argument] = location.hash.slice(1).split("/");
@@ -42,7 +42,7 @@ function showBuild(state) {
 // A new link of a studio that was started again, opened in the same tab, changes the hash alone.
 function follow() {
   if (new URLSearchParams(location.hash.slice(1)).has("t")) location.reload();
-  else show();
+  else if (ready) show();
 }
 
 async function start() {
@@ -59,6 +59,7 @@ async function start() {
     document.getElementById("page").append(text);
     return;
   }
+  ready = true;
   listen();
   show();
 }
