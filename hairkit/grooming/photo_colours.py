@@ -3,11 +3,12 @@
 Brightness is that of the pixels in the masks, hue that of points of the strands that photos show:
 what masks take for hair beside the strands, and skin that shows between them, gives it none.
 
-Light and shade change how bright hair is by a factor of four and more, but its hue hardly: over
-eight captures of one colour the logarithms of red, green and blue, less their mean, stay within
-`FROM` of the head's for all but a hundredth of the hair. So only hair of another hue is taken for
-dyed, and there alone its brightness counts too; bleached or grey hair of the same hue is not told
-from hair in the light. Hues are medians over the photos that see a place, and over its neighbours.
+Light and shade change how bright hair is by a factor of four and more, but its hue hardly: on seven
+captures of long hair of one colour the logarithms of red, green and blue, less that of their luma,
+are within 0.32 of the head's for 99 % of what is seen; on cropped hair, through which skin shows,
+within 0.69. So only hair of another hue is taken for dyed, and there alone its brightness counts
+too; bleached or grey hair of the same hue is not told from hair in the light. Hues are medians over
+the photos that see a place, and over its neighbours.
 """
 
 from __future__ import annotations

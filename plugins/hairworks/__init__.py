@@ -117,9 +117,10 @@ class Options:
 @hookimpl
 def export_groom(groom: Groom, path: Path, options: Options) -> bool:
     """Write the groom's guides as .apx, and maps beside it where options say so."""
-    maps = scalp_maps(_chosen(groom, options)) if options.maps else {}
+    chosen = _chosen(groom, options)
+    maps = scalp_maps(chosen) if options.maps else {}
     if "widthTexture" in maps:  # it makes strands thinner than the widest
-        widest = float(widths(_chosen(groom, options)).max())
+        widest = float(widths(chosen).max())
         groom = replace(groom, material=replace(groom.material, width=widest))
     asset = exported_asset(groom, options)
     files = {name: f"{path.stem}_{name.removesuffix('Texture')}.tga" for name in maps}
