@@ -124,9 +124,16 @@ def measure_scheduler() -> Scheduler:
     """Return what a task costs: the difference of two runs, whose futures are all kept."""
     from distributed import Client, LocalCluster
 
-    with LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None, memory_limit=0
-    ) as cluster, Client(cluster) as client:  # fmt: skip
+    with (
+        LocalCluster(
+            n_workers=1,
+            threads_per_worker=1,
+            processes=False,
+            dashboard_address="127.0.0.1:0",  # without one, port 8787, which may be taken
+            memory_limit=0,
+        ) as cluster,
+        Client(cluster) as client,
+    ):
         seconds, memory = [], []
         for count in TASKS:
             began, before = time.perf_counter(), resident_bytes(os.getpid())

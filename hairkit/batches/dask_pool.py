@@ -34,6 +34,7 @@ and adaptive clusters see hours of work (studies/farm_scheduler.py)."""
 TASK = "hairkit-capture"
 """First part of the keys, by which Dask takes all captures for one group and queues them: keys that
 begin otherwise each would be groups of their own, and given to workers at once."""
+GONE = "the Dask scheduler is gone; run the batch again, it does what is missing"
 _own = threading.local()
 
 
@@ -92,21 +93,21 @@ class DaskPool:
                 if future.status in ("finished", "error") and future.key in self._futures:
                     return future
             if self._client.status != "running":
-                raise SchedulerLostError(
-                    "the Dask scheduler is gone; run the batch again, it does what is missing"
-                )
+                raise SchedulerLostError(GONE)
 
     def _result(self, future: Any, job: Job) -> Result:
         """Return what a future holds; a job whose workers were all lost has failed."""
-        error = future.exception()
-        if error is None:
+        distributed = _distributed()
+        try:
             result: Result = future.result()
             return result
-        if isinstance(error, _distributed().KilledWorker):
+        except (distributed.CancelledError, distributed.comm.CommClosedError) as error:
+            raise SchedulerLostError(GONE) from error  # it ended just before the scheduler did
+        except distributed.KilledWorker as error:
             reason = f"the workers that had it were lost {error.allowed_failures + 1} times"
-            return Result(job.name, FAILED, job.out, error=reason)
-        line = one_line(f"{type(error).__name__}: {error}")
-        return Result(job.name, FAILED, job.out, error=line)
+        except Exception as error:
+            reason = one_line(f"{type(error).__name__}: {error}")
+        return Result(job.name, FAILED, job.out, error=reason)
 
 
 def local_client(workers: int) -> Any:

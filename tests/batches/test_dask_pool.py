@@ -14,7 +14,7 @@ from hairkit.batches.jobs import find_jobs
 
 pytest.importorskip("distributed")
 START = f"""
-import os, signal, subprocess, sys, threading, time
+import contextlib, json, os, signal, subprocess, sys, threading, time
 sys.path.insert(0, {str(Path(quick_captures.__file__).parent)!r})
 from pathlib import Path
 from quick_captures import COMMAND
@@ -54,15 +54,18 @@ def main():
     scheduler = [*dask, "scheduler", "--port", "0", "--no-dashboard", "--scheduler-file", "at.json"]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     first = subprocess.Popen(scheduler, **quiet)
-    worker = [*dask, "worker", "--scheduler-file", "at.json", "--no-nanny", "--nthreads", "1"]
-    second = subprocess.Popen([*worker, "--no-dashboard", "--death-timeout", "5"], **quiet)
-    while not Path("at.json").exists():
+    address = None
+    while address is None:
         time.sleep(0.05)
-    import json
-    client = connect(json.loads(Path("at.json").read_text())["address"])
+        with contextlib.suppress(OSError, ValueError):  # not there, or half-written
+            address = json.loads(Path("at.json").read_text())["address"]
+    worker = [*dask, "worker", address, "--no-nanny", "--nthreads", "1", "--no-dashboard"]
+    second = subprocess.Popen([*worker, "--death-timeout", "5"], **quiet)
+    client = connect(address)
     try:
         for result in pool(client).run(missing(), Settings(seed=400)):
             print(result.state, result.name, flush=True)
+            time.sleep(LATE)  # others may end before the scheduler is lost
             first.kill()
     except SchedulerLostError as error:
         print("lost:", error, flush=True)
@@ -103,15 +106,19 @@ def test_a_killed_worker_of_dask_loses_nothing(tmp_path: Path) -> None:
         assert (tmp_path / "out" / name / "groom.npz").read_bytes() == name.encode()
 
 
-def test_a_lost_scheduler_is_one_line_and_the_rest_is_done_again(tmp_path: Path) -> None:
+@pytest.mark.parametrize("late", [0.0, 1.5])
+def test_a_lost_scheduler_is_one_line_and_the_rest_is_done_again(
+    tmp_path: Path, late: float
+) -> None:
     """kill -9 of the scheduler ends the batch in one line; done captures stay done."""
     names = [f"good-{number}" for number in range(6)]
     write_captures(tmp_path / "captures", *names)
-    lines = run(LOST, tmp_path)
+    lines = run(LOST.replace("LATE", str(late)), tmp_path)
     assert lines[0].startswith("done")
     assert lines[-1].startswith("lost: the Dask scheduler is gone; run the batch again")
     done = [path.parent.name for path in (tmp_path / "out").glob("*/batch.json")]
-    assert 1 <= len(done) < len(names)
+    assert len(done) >= 1
+    assert late or len(done) < len(names)
     assert len(find_jobs(tmp_path / "captures", tmp_path / "out")) == len(names)
 
 
