@@ -177,7 +177,7 @@ def assess_landmarks(capture: Capture, scene: Scene) -> tuple[Figure, ...]:
         (v, c) for v, c in zip(capture.views, scene.cameras, strict=True) if v.landmarks is not None
     ]
     count = len(known)
-    note = "no face was found, so the size of the head is a guess; give landmarks.json"
+    note = "no face was found, the head's size is a guess; try `hairkit models`, or landmarks.json"
     light = GREEN if count == len(capture.views) else ""
     figures = [LANDMARK_VIEWS.figure(count, note, light)]
     corners = scene.head.landmark_vertices
