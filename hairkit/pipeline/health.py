@@ -138,7 +138,7 @@ def assess(
         *assess_ties(evidence.tied, scene.head),
         *(assess_seen(groom.strands) if scene.one_sided else ()),
         *assess_strands(groom, roots, hair_length),
-        *assess_drawing(shown, scene, groom),
+        *assess_drawing(shown, scene, groom, evidence.waves.slant),
     )
 
 
@@ -315,15 +315,18 @@ def assess_strands(groom: Groom, roots: int, hair_length: float) -> tuple[Figure
     )
 
 
-def assess_drawing(shown: Sequence[PhotoHair], scene: Scene, groom: Groom) -> tuple[Figure, ...]:
+def assess_drawing(
+    shown: Sequence[PhotoHair], scene: Scene, groom: Groom, slant: float = 0.0
+) -> tuple[Figure, ...]:
     """Return how the drawn guides agree with the photos: directions, where hair is, and curls.
 
-    Directions of steep curls are not judged: their coils are not where those of the photos are.
+    Directions of steep curls are not judged, for their coils are not where those of the photos are:
+    but where all turn one way, as a slant says, photos show their axes.
     """
     names, groom = scene.names, with_pieces(groom)
     views = [compare_drawing(groom, *row) for row in zip(scene.cameras, shown, strict=True)]
     steep = groom.material.curl_radius * 2 * np.pi > groom.material.curl_pitch
-    if not steep:
+    if not steep or slant:
         shares = [share_of(view.right, view.judged) for view in views]
         share = share_of(sum(v.right for v in views), sum(v.judged for v in views))
         note = f"the hair lies otherwise than in the photos, most of all in {_worst(names, shares)}"
