@@ -81,7 +81,7 @@ than that, or longer, is chance."""
 COILS = Waves(0.004, 0.011)
 """Of tight coils, metres: their scale is below what photos of a head resolve (type 4 hair has radii
 of 2 to 5 mm)."""
-AXIS_SCATTER = 0.12
+AXIS_SCATTER = 0.18
 """Radians by which axes scatter about the vertical; as much again for each unit of slope."""
 LINE_SHARE, LINE_SPREAD = 0.45, 0.5
 """Usual share of the power that is lines, not noise, and the spread of its logarithm."""
@@ -333,12 +333,14 @@ def _fit_slope(second: float, fourth: float) -> float:
 def helix_moments(slopes: Float64Array) -> Float64Array:
     """Return the mean of cos 2 phi and of cos 4 phi (2, N) over the near half of helices.
 
-    phi is the drawn strand's angle off the axis: `tan phi = slope cos u` on the half turn u. Places
-    count by their drawn length and, since they face the camera less to the sides, by sqrt(cos u).
+    phi is the drawn strand's angle off the axis: `tan phi = slope cos u` on the half turn u. How
+    places count was fitted, with `AXIS_SCATTER`, to photos and true strands of 13 heads of hair of
+    11 kinds, slopes 0.36 to 1.6: those that run across the axis count more than by their drawn
+    length, and those to the sides, which face the camera less, hardly less.
     """
     turn = (np.arange(360) + 0.5) / 360 * np.pi - np.pi / 2
     slant = np.asarray(slopes)[:, None] * np.cos(turn)
-    weight = np.sqrt((1 + slant**2) * np.cos(turn))
+    weight = (1 + slant**2) ** 1.5 * np.cos(turn) ** 0.25
     angle = np.arctan(slant)
     means = [(weight * np.cos(n * angle)).sum(axis=1) / weight.sum(axis=1) for n in (2, 4)]
     return np.stack(means)
