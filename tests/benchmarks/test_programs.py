@@ -44,6 +44,10 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
         ["--strands", "300", "--points", "8", "--cards", "20", "--atlas", "256"],
     ),
     "few_photos": ({"GUIDES": 60}, ["CAPTURES", "--photos", "1"]),
+    "films": (
+        {"KINDS": ("short",), "GUIDES": 20, "SHOWN": (0.1,), "SIZE": (40, 40)},
+        ["--films", "jump", "--hairs", "40", "-o", "CAPTURES/films"],
+    ),
     "growth": ({}, ["CAPTURES/short", "--strands", "50", "--rounds", "1"]),
     "head_fit": ({"MIXINGS": 1, "ROUNDS": 2}, ["CAPTURES"]),
     "health": ({"GUIDES": 30}, ["CAPTURES", "-o", "CAPTURES/health", "--ways", "cut to 0.6"]),
