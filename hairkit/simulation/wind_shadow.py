@@ -2,7 +2,7 @@
 
 Air gives hair the momentum that it loses: where drag accelerates hair at the rate c to the air's
 speed U, rho_air U dU/dx = -c rho_hair U. So it is in a canopy of plants, whose drag is quadratic
-(Belcher, Jerram and Hunt 2003). With c of 2/s about 10 cm of hair take all of a wind of 6 m/s.
+(Belcher, Jerram and Hunt 2003). With c of 2/s 8 cm of long hair take all of a wind of 6 m/s.
 """
 
 from __future__ import annotations
