@@ -21,7 +21,8 @@ The simulators are plugins: `manager.call("make_simulator", "rods", groom=groom)
 * `simulator`: the protocol of all simulators
 * `substeps`: what substeps of a frame are given
 * `vectors`: vectors and quaternions of numbers, for compiled code
-* `wind`, `wind_shadow`: mean wind and gusts; what hair and head leave of wind
+* `wind`: mean wind and gusts
+* `wind_shadow`: what hair and head leave of wind
 """
 
 from __future__ import annotations

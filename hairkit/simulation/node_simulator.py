@@ -209,10 +209,9 @@ class NodeSimulator(GuideSimulator):
         return points
 
     def _air(self, around: Surroundings, head: Float64Array) -> Float64Array:
-        """Return the air velocity at the nodes, world, where hair and head hold back the mean wind.
+        """Return the air velocity at the nodes, world: what passes hair and head, and all gusts.
 
-        Gusts are those where the head carries the nodes, and full behind hair, where air is as
-        turbulent. Air is evaluated at every `APART`-th node and interpolated between.
+        Gusts are those where the head carries the nodes. Both are interpolated from some nodes.
         """
         wind = np.asarray(around.wind, np.float64)
         if not wind.any():
