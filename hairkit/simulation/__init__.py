@@ -22,6 +22,7 @@ The simulators are plugins: `manager.call("make_simulator", "rods", groom=groom)
 * `substeps`: what substeps of a frame are given
 * `vectors`: vectors and quaternions of numbers, for compiled code
 * `wind`: mean wind and gusts
+* `wind_shadow`: what hair and head leave of wind
 """
 
 from __future__ import annotations

@@ -23,6 +23,7 @@ from hairkit.simulation.embedding import (
     node_points,
 )
 from hairkit.simulation.guide_simulator import FRAME, KERATIN, GuideSimulator
+from hairkit.simulation.hair_grid import SPACING, make_hair_grid
 from hairkit.simulation.held_guides import held_lengths, pull_to_captured
 from hairkit.simulation.obstacle_kernels import WORTH, Points
 from hairkit.simulation.rigid_motion import (
@@ -35,11 +36,12 @@ from hairkit.simulation.simulator import Measures, Surroundings
 from hairkit.simulation.substeps import Course, StepArrays, make_steps
 from hairkit.simulation.vectors import Floats
 from hairkit.simulation.wind import air_velocity
+from hairkit.simulation.wind_shadow import passing_wind, wind_losses
 from hairkit.types.groom import Groom
 from hairkit.types.node_options import NodeOptions
 
 APART = 4
-"""Nodes between those at which gusts are evaluated: shorter than half a gust is long."""
+"""Nodes between those at which air is evaluated: shorter than half a gust is long."""
 
 
 class NodeSimulator(GuideSimulator):
@@ -148,6 +150,8 @@ class NodeSimulator(GuideSimulator):
         bars = np.pad(self._density * self._length, ((0, 0), (1, 1)))
         self._mass = 0.5 * (bars[:, 1:] + bars[:, :-1])
         self._near = self._bodies.at(self._nodes)[0]
+        hair = self._hair_grid = make_hair_grid(self._nodes, self._mass)
+        self._loss = wind_losses(hair, len(strands), SPACING * self._density.mean(), self._bodies)
         self._held = held_lengths(self._groom) / np.maximum(strands.lengths(), 1e-9)
 
     def _tune(self, options: NodeOptions) -> None:
@@ -205,16 +209,18 @@ class NodeSimulator(GuideSimulator):
         return points
 
     def _air(self, around: Surroundings, head: Float64Array) -> Float64Array:
-        """Return the air velocity at the nodes, world; gusts are those where the head carries them.
+        """Return the air velocity at the nodes, world: what passes hair and head, and all gusts.
 
-        They are evaluated at every `APART`-th node and interpolated between.
+        Gusts are those where the head carries the nodes. Both are interpolated from some nodes.
         """
         wind = np.asarray(around.wind, np.float64)
-        if around.turbulence == 0.0 or not wind.any():
+        if not wind.any():
             return wind
         nodes = self._nodes.shape[1]
         some = np.unique(np.append(np.arange(0, nodes, APART), nodes - 1))
         share = np.stack([np.interp(np.arange(nodes), some, row) for row in np.eye(len(some))], 1)
         places, seed = self._nodes[:, some].astype(np.float32), self._options.seed
         air = air_velocity(places, self._time, wind, around.turbulence, seed, head)
-        return share @ air
+        own, now = wind @ head[:3, :3], self._now()[0][:, :, some].reshape(-1, 3)[: air.size // 3]
+        passing = passing_wind(self._loss, self._hair_grid.origin, now, own, self._options.drag)
+        return share @ (air - (1 - passing.reshape(*air.shape[:2], 1)) * wind)

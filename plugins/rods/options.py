@@ -24,7 +24,7 @@ class Options(NodeOptions):
         0.77, low=0.01, high=1.0, doc="Torsional over bending stiffness, GJ/EI; 0.77 for fibres."
     )
     cohesion: float = option(
-        2.0,
+        10.0,
         low=0.0,
         high=60.0,
         unit="1/s",

@@ -9,7 +9,6 @@ import numpy as np
 from hairkit.arrays import Float64Array
 from hairkit.simulation import Surroundings
 from hairkit.simulation.guide_simulator import FRAME
-from hairkit.simulation.hair_grid import make_hair_grid
 from hairkit.simulation.held_guides import borne_masses
 from hairkit.simulation.node_simulator import NodeSimulator
 from hairkit.simulation.rigid_motion import inverse_motion
@@ -64,17 +63,12 @@ class RodSimulator(NodeSimulator):
         options = self._options
         self.rods = rods = self._stiffen(options)
         self._pull = self._pull_to_rest()
-        self._hair_grid = make_hair_grid(self._nodes, rods.mass)
         self._rest_energy = elastic_energy(rods, rods.points, rods.frames, self._pull)
         self._system = lru_cache(KEPT_SYSTEMS)(self._assemble)
         friction = options.friction or 0.0
         contact = Contact(self._bodies, near, friction, options.depenetration, options.rounds)
-        self._engine = self._make_engine(contact)
-
-    def _make_engine(self, contact: Contact) -> Engine:
-        """Return the engine of the options."""
-        exact = self._options.backend == "reference"
-        return Engine(self.rods, contact, np.float64 if exact else np.float32)
+        exact = options.backend == "reference"
+        self._engine = Engine(rods, contact, np.float64 if exact else np.float32)
 
     def _stiffen(self, options: Options) -> Rods:
         """Return the rods, whose natural shape balances what weight nothing else bears."""

@@ -47,6 +47,9 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
     "film": (
         {"GUIDES": 60, "STRANDS": 300, "FRAMES": 60, "SIZE": (180, 320)},
         ["--styles", "short"],
+    "films": (
+        {"KINDS": ("short",), "GUIDES": 20, "SHOWN": (0.1,), "SIZE": (40, 40)},
+        ["--films", "jump", "--hairs", "40", "-o", "CAPTURES/films"],
     ),
     "growth": ({}, ["CAPTURES/short", "--strands", "50", "--rounds", "1"]),
     "head_fit": ({"MIXINGS": 1, "ROUNDS": 2}, ["CAPTURES"]),
