@@ -44,9 +44,6 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
         ["--strands", "300", "--points", "8", "--cards", "20", "--atlas", "256"],
     ),
     "few_photos": ({"GUIDES": 60}, ["CAPTURES", "--photos", "1"]),
-    "film": (
-        {"GUIDES": 60, "STRANDS": 300, "FRAMES": 60, "SIZE": (180, 320)},
-        ["--styles", "short"],
     "films": (
         {"KINDS": ("short",), "GUIDES": 20, "SHOWN": (0.1,), "SIZE": (40, 40)},
         ["--films", "jump", "--hairs", "40", "-o", "CAPTURES/films"],
@@ -90,6 +87,10 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
     "texture_gallery": ({"SIZE": 64}, ["-o", "CAPTURES/gallery"]),
     "threads": ({"REPETITIONS": 1}, ["--runs", "2"]),
     "turn": ({"SHUFFLES": 1}, ["CAPTURES"]),
+    "video": (
+        {"GUIDES": 60, "STRANDS": 300, "FRAMES": 60, "SIZE": (180, 320)},
+        ["--styles", "short"],
+    ),
     "viewer": (
         {"WARM": 1, "SETTLING": 2, "ROWS": ((False, 0), (True, 3), (None, None))},
         ["--guides", "20", "--hairs", "60", "--size", "64x48", "--pictures", "1"],

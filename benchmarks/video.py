@@ -1,6 +1,6 @@
 """What a film of a turn gives, beside eight photos of the same turn.
 
-    python benchmarks/film.py --styles short wavy curly
+    python benchmarks/video.py --styles short wavy curly
 
 Each style of `hairkit synth` is filmed while it turns unevenly in front of a still room: 120 frames
 of a hand-held camera whose direction, height, roll, distance and aim drift (sums of slow waves).
@@ -49,7 +49,7 @@ COLUMNS = ("4/40", "3/30", "2/20", "length", "azimuth off", "red", "amber", "pro
 
 def main() -> None:
     """Print two rows for each style, and the means."""
-    parser = argparse.ArgumentParser(prog="film.py", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(prog="video.py", description=__doc__.splitlines()[0])
     parser.add_argument("--styles", nargs="+", choices=list(STYLES), default=["short", "wavy"])
     parser.add_argument("--seed", type=int, default=5, help="of hair, room and camera (5)")
     args = parser.parse_args()
