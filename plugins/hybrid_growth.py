@@ -313,7 +313,7 @@ def _resample(path: Float64Array, points: Float32Array) -> None:
             points[m, axis] = first + (path[before + 1, axis] - first) * (at - before)
 
 
-@compiled_with(allocates=True)
+@compiled_with(allocates=True, inside=True)
 def _grow_strand(
     volume: SignedVolume, rules: Rules, start: Float32Array, limits: Int64Array, path: Float64Array
 ) -> int:
@@ -354,7 +354,7 @@ def _grow_strand(
     return count
 
 
-@compiled_with(allocates=True)
+@compiled_with(allocates=True, inside=True)
 def _slide(
     volume: SignedVolume, rules: Rules, back: float, p: Float64Array, d: Float64Array
 ) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float64Array, Int32Array, Int64Array
-from hairkit.parallel import compiled, compiled_with
+from hairkit.parallel import compiled_inside, compiled_with
 
 _LEAF = 4
 """Triangles of a leaf."""
@@ -110,7 +110,7 @@ def _nearest(
     return slots, weights, distances
 
 
-@compiled_with(allocates=True)
+@compiled_with(allocates=True, inside=True)
 def nearest_slot(tree: TriangleTree, point: Float64Array, guess: int) -> tuple[int, float]:
     """Return the slot of the nearest triangle and the squared distance, starting from a guess."""
     lower, upper, corners = tree.lower, tree.upper, tree.corners
@@ -144,7 +144,7 @@ def nearest_slot(tree: TriangleTree, point: Float64Array, guess: int) -> tuple[i
     return slot, best
 
 
-@compiled
+@compiled_inside
 def box_distance(point: Float64Array, low: Float64Array, high: Float64Array) -> float:
     """Return the squared distance from a point to a box."""
     total = 0.0
@@ -154,7 +154,7 @@ def box_distance(point: Float64Array, low: Float64Array, high: Float64Array) -> 
     return total
 
 
-@compiled
+@compiled_inside
 def triangle_distance(
     point: Float64Array, triangle: Float64Array
 ) -> tuple[float, float, float, float]:
@@ -224,7 +224,7 @@ def _crossings(tree: TriangleTree, points: Float64Array, axis: int) -> Int64Arra
     return totals
 
 
-@compiled
+@compiled_inside
 def line_crossing(triangle: Float64Array, axis: int, at_b: float, at_c: float) -> tuple[int, float]:
     """Return +1, -1 or 0 and where along `axis` the line (at_b, at_c) crosses a triangle.
 
@@ -248,7 +248,7 @@ def line_crossing(triangle: Float64Array, axis: int, at_b: float, at_c: float) -
     return turns, triangle[0, axis] + rise
 
 
-@compiled
+@compiled_inside
 def edge_crossing(
     start: Float64Array, end: Float64Array, b: int, c: int, at_b: float, at_c: float
 ) -> int:
