@@ -8,6 +8,9 @@ most it is given back, so that what one stage leaves does not add to the peak of
 
 from __future__ import annotations
 
+import atexit
+import gc
+
 from hairkit.system import of_glibc
 
 TRIM_THRESHOLD, TOP_PAD, MMAP_THRESHOLD, ARENA_MAX = -1, -2, -3, -8
@@ -19,8 +22,19 @@ Kept too, arrays of more than 32 MiB would tear holes that the next ones do not 
 more for the sample, at the same processor time."""
 
 
+NEW_OBJECTS = 20_000
+"""Objects after which Python looks for cycles among the newest; importing libraries makes 400,000.
+With Python's 700 it looks 386 times in a run of the sample, 0.21 processor seconds, with these 13
+times, 0.08."""
+
+
 def keep_freed_memory() -> None:
-    """Keep freed memory in this process; nothing happens where the C library is not glibc."""
+    """Keep freed memory in this process, as far as the C library is glibc.
+
+    Python looks for cycles less often, and not at all when it ends: 0.3 seconds for all libraries.
+    """
+    gc.set_threshold(NEW_OBJECTS, *gc.get_threshold()[1:])
+    atexit.register(gc.freeze)
     mallopt = of_glibc("mallopt")
     if mallopt is not None:
         for setting, value in SETTINGS.items():
