@@ -44,12 +44,12 @@ def build_tree(vertices: npt.ArrayLike, faces: npt.ArrayLike) -> TriangleTree:
     face = np.minimum(order, count - 1)
     triangles = triangles[face]
     triangles[count:, 1:] = triangles[count:, :1]  # no ray crosses a point
-    middle = triangles.mean(axis=1)
+    middle = np.ascontiguousarray(triangles.mean(axis=1).T)
     for level in range(depth):
         parts = order.reshape(1 << level, -1)
-        centres = middle[parts]
-        axis = np.ptp(centres, axis=1).argmax(axis=1)
-        along = np.take_along_axis(centres, axis[:, None, None], axis=2)[..., 0]
+        centres = middle[:, parts]
+        axis = np.ptp(centres, axis=2).argmax(axis=0)
+        along = np.take_along_axis(centres, axis[None, :, None], axis=0)[0]
         order = np.take_along_axis(parts, along.argsort(axis=1, kind="stable"), axis=1).ravel()
     corners = np.ascontiguousarray(triangles[order])
     leaves = corners.reshape(1 << depth, -1, 3)
@@ -83,10 +83,10 @@ def inside_surface(tree: TriangleTree, points: npt.ArrayLike) -> npt.NDArray[np.
     A ray's signed crossings are summed, so bodies may overlap and may be wound either way.
     """
     at = np.ascontiguousarray(points, np.float64).reshape(-1, 3)
-    votes = np.zeros(len(at), np.int64)
-    for axis in range(3):
-        votes += _crossings(tree, at, axis) != 0
-    return votes >= 2
+    inside, second = (_crossings(tree, at, axis) != 0 for axis in range(2))
+    split = inside != second
+    inside[split] = _crossings(tree, at[split], 2) != 0
+    return inside
 
 
 @compiled_with(allocates=True)
