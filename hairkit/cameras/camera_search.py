@@ -122,7 +122,7 @@ class Search:
                 if damping > MOST_DAMPING:
                     break
                 continue
-            settled = fit.cost - trial.cost < SETTLED * noise**2 * fit.cost
+            settled = fit.cost - trial.cost < SETTLED * fit.cost
             fit, here, damping = trial, there, damping / 5
             if settled:
                 break
