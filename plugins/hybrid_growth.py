@@ -295,7 +295,10 @@ def _grow_strands(
 
     `limits` (N, 2) are the most steps of each strand, and those on which it may slide.
     """
-    path = np.empty((limits[:, 0].max() + 1, 3))
+    longest = 0
+    for k in range(first, last):  # an array's own `max` takes Numba half a second to compile
+        longest = max(longest, limits[order[k], 0])
+    path = np.empty((longest + 1, 3))
     for k in range(first, last):
         s = order[k]
         count = _grow_strand(volume, rules, starts[s], limits[s], path)
@@ -318,7 +321,8 @@ def _grow_strand(
     volume: SignedVolume, rules: Rules, start: Float32Array, limits: Int64Array, path: Float64Array
 ) -> int:
     """Write one strand's points into path (M, 3); return their number, at least 2."""
-    p, d, found = np.empty(3), np.zeros(3), np.empty(5)
+    p, d, found = np.empty(3), np.empty(3), np.empty(5)
+    d[0], d[1], d[2] = 0.0, 0.0, 0.0
     copy_point(start, p)
     copy_point(p, path[0])
     count, inside = 1, 1

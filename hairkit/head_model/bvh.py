@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float64Array, Int32Array, Int64Array
-from hairkit.parallel import compiled_inside, compiled_with
+from hairkit.parallel import compiled, compiled_inside, compiled_with
 
 _LEAF = 4
 """Triangles of a leaf."""
@@ -73,7 +73,8 @@ def nearest_on_surface(
     Points (N, 3) that follow each other in space are found fastest.
     """
     at = np.ascontiguousarray(points, np.float64).reshape(-1, 3)
-    slot, weights, distance = _nearest(tree, at)
+    slot, weights, distance = np.empty(len(at), np.int64), np.empty((len(at), 3)), np.empty(len(at))
+    _nearest(tree, at, slot, weights, distance)
     return tree.order[slot].astype(np.int32), weights, distance
 
 
@@ -83,31 +84,36 @@ def inside_surface(tree: TriangleTree, points: npt.ArrayLike) -> npt.NDArray[np.
     A ray's signed crossings are summed, so bodies may overlap and may be wound either way.
     """
     at = np.ascontiguousarray(points, np.float64).reshape(-1, 3)
-    inside, second = (_crossings(tree, at, axis) != 0 for axis in range(2))
+    inside, second = (_crossed(tree, at, axis) for axis in range(2))
     split = inside != second
-    inside[split] = _crossings(tree, at[split], 2) != 0
+    inside[split] = _crossed(tree, at[split], 2)
     return inside
 
 
-@compiled_with(allocates=True)
+def _crossed(tree: TriangleTree, points: Float64Array, axis: int) -> npt.NDArray[np.bool_]:
+    totals = np.zeros(len(points), np.int64)
+    _crossings(tree, points, axis, totals)
+    return np.asarray(totals != 0)
+
+
+@compiled
 def _nearest(
-    tree: TriangleTree, points: Float64Array
-) -> tuple[Int64Array, Float64Array, Float64Array]:
-    """Return slots (N,), weights (N, 3) and distances (N,), each search begun at the last slot."""
-    count = len(points)
-    slots = np.zeros(count, np.int64)
-    weights = np.zeros((count, 3))
-    distances = np.zeros(count)
+    tree: TriangleTree,
+    points: Float64Array,
+    slots: Int64Array,
+    weights: Float64Array,
+    distances: Float64Array,
+) -> None:
+    """Write slots (N,), weights (N, 3) and distances (N,), each search begun at the last slot."""
     previous = int(
         np.int64(0)
     )  # a plain 0 would have a type of its own, and a search compiled for it
-    for i in range(count):
+    for i in range(len(points)):
         slot, squared = nearest_slot(tree, points[i], previous)
         slots[i], distances[i], previous = slot, np.sqrt(squared), slot
         _, weights[i, 0], weights[i, 1], weights[i, 2] = triangle_distance(
             points[i], tree.corners[slot]
         )
-    return slots, weights, distances
 
 
 @compiled_with(allocates=True, inside=True)
@@ -193,12 +199,11 @@ def triangle_distance(
 
 
 @compiled_with(allocates=True)
-def _crossings(tree: TriangleTree, points: Float64Array, axis: int) -> Int64Array:
-    """Return (N,) the sums of signed crossings of the rays from points (N, 3) along +axis."""
+def _crossings(tree: TriangleTree, points: Float64Array, axis: int, totals: Int64Array) -> None:
+    """Add to totals (N,) the signed crossings of the rays from points (N, 3) along +axis."""
     lower, upper, corners = tree.lower, tree.upper, tree.corners
     first_leaf = len(lower) // 2
     b, c = (axis + 1) % 3, (axis + 2) % 3
-    totals = np.zeros(len(points), np.int64)
     stack = np.empty(_STACK, np.int64)
     for i in range(len(points)):
         p = points[i]
@@ -221,7 +226,6 @@ def _crossings(tree: TriangleTree, points: Float64Array, axis: int) -> Int64Arra
                 sign, height = line_crossing(corners[k], axis, p[b], p[c])
                 if sign != 0 and height > p[axis]:
                     totals[i] += sign
-    return totals
 
 
 @compiled_inside

@@ -65,7 +65,9 @@ def _within(cells: BoolArray, squared: float) -> BoolArray:
     room = np.pad(cells, ((reach, reach), (0, reach), (0, 0))).astype(np.uint8)
     steps = np.square(np.arange(-reach, reach + 1))
     found = np.zeros(cells.shape, np.bool_)
-    for step in range(reach + 1):  # layers of a ball are discs, for which the layers are one picture
+    for step in range(
+        reach + 1
+    ):  # layers of a ball are discs, for which the layers are one picture
         disc = (steps[:, None] + steps <= squared - step**2).astype(np.uint8)
         wide = cv2.dilate(room.reshape(-1, room.shape[2]), disc).reshape(room.shape) > 0
         for first in (reach - step, reach + step):
