@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from threading import Lock
 
 import numpy as np
 from scipy.spatial import ConvexHull, cKDTree
@@ -64,7 +65,6 @@ _CAPSULES = np.array(
 )
 
 
-@cache
 def default_head() -> Head:
     """Return the average adult head with two eyeballs, breadth 0.155 m, watertight.
 
@@ -72,6 +72,15 @@ def default_head() -> Head:
     of the neck's cut, the face below the middle), so they are injective. Every call returns
     the same object.
     """
+    with _GUARD:  # threads that ask at the same time wait for one head
+        return _make_head()
+
+
+_GUARD = Lock()
+
+
+@cache
+def _make_head() -> Head:
     directions, faces = _sphere(FREQUENCY)
     directions = _refine_regions(directions)
     vertices = head_surface(*_angles(directions))
