@@ -15,7 +15,6 @@ import re
 import shutil
 import threading
 import time
-import weakref
 import zipfile
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -24,7 +23,6 @@ from pathlib import Path
 from typing import Any, Self, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
 from hairkit.errors import HairkitError, InputError
 from hairkit.stages import FITTED, LABELS, REFINED, SCENE, Stage
@@ -43,10 +41,6 @@ _DIGEST = "work_digest"
 _LOCK_POLL_S = 0.2
 _NAME_KEPT, _NAME_DIGITS = 60, 8
 """Letters of a view's name, and digits of its digest, in the names of its files."""
-_LARGE = 2**16
-"""Bytes of arrays whose digest is kept."""
-_CONTENTS: dict[int, tuple[weakref.ref[Any], bytes]] = {}
-"""Digests of their content, by their identity."""
 _ALL_READ_AND_WRITE = 0o666
 """Permissions of the lock file, less the user's umask."""
 
@@ -67,7 +61,7 @@ def _feed(state: hashlib._Hash, value: Any) -> None:
     state.update(f"\0{type(value).__name__}:".encode())
     if isinstance(value, np.ndarray):
         state.update(f"{value.dtype.str}{value.shape}".encode())
-        state.update(_content_of(value))
+        state.update(np.ascontiguousarray(value).data)
     elif isinstance(value, Path):
         state.update(value.read_bytes() if value.is_file() else b"")
     elif dataclasses.is_dataclass(value):
@@ -82,20 +76,6 @@ def _feed(state: hashlib._Hash, value: Any) -> None:
         state.update(repr(value).encode())
     else:
         raise TypeError(f"no digest of a {type(value).__name__}")
-
-
-def _content_of(array: npt.NDArray[Any]) -> Any:
-    """Return an array's bytes, of a large one their digest, kept while it lives and cannot change:
-    a photo is an input of a dozen stages."""
-    key, data = id(array), np.ascontiguousarray(array).data
-    if array.nbytes < _LARGE:
-        return data
-    if key in _CONTENTS:
-        return _CONTENTS[key][1]
-    digest = hashlib.sha256(data).digest()
-    if array.base is None and not array.flags.writeable:
-        _CONTENTS[key] = weakref.ref(array, lambda _: _CONTENTS.pop(key, None)), digest
-    return digest
 
 
 class WorkFolder:
