@@ -35,21 +35,14 @@ def compiled(function: _Function) -> _Function:
     return compiled_with()(function)
 
 
-def compiled_inside(function: _Function) -> _Function:
-    """Compile a function that compiled functions alone call: Python would crash by calling it.
-
-    What Python calls a function by takes a tenth of the time of compiling it.
-    """
-    return compiled_with(inside=True)(function)
-
-
 def compiled_with(
     *, allocates: bool = False, inside: bool = False, **options: Any
 ) -> Callable[[_Function], _Function]:
-    """Return the same decorators with more of Numba's options: `fastmath=True`.
+    """Return the same decorator with more of Numba's options: `fastmath=True`.
 
     `allocates` is for functions that make or return arrays. Those that return one are called by
-    Python alone: another compiled function would never free it. `inside` is as above.
+    Python alone: another compiled function would never free it. `inside` is for functions that
+    compiled ones alone call: they take a tenth less time to compile, and Python would crash.
     """
 
     def decorate(function: _Function) -> _Function:

@@ -295,10 +295,7 @@ def _grow_strands(
 
     `limits` (N, 2) are the most steps of each strand, and those on which it may slide.
     """
-    longest = 0
-    for k in range(first, last):  # an array's own `max` takes Numba half a second to compile
-        longest = max(longest, limits[order[k], 0])
-    path = np.empty((longest + 1, 3))
+    path = np.empty((int(MAX_LENGTH / rules.step) + 3, 3))
     for k in range(first, last):
         s = order[k]
         count = _grow_strand(volume, rules, starts[s], limits[s], path)

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array
-from hairkit.parallel import compiled, compiled_inside, compiled_with
+from hairkit.parallel import compiled, compiled_with
 from hairkit.types.volume import XX, XY, XZ, YY, YZ, ZZ
 
 BORDER_CELLS = 1.001
@@ -53,7 +53,7 @@ def sample_at(
         result[c] = v00 + (v10 - v00) * tx
 
 
-@compiled_inside
+@compiled_with(inside=True)
 def copy_point(point: npt.NDArray[np.floating[Any]], target: npt.NDArray[np.floating[Any]]) -> None:
     """Write a point (3,) into another.
 

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float64Array, Int32Array, Int64Array
-from hairkit.parallel import compiled, compiled_inside, compiled_with
+from hairkit.parallel import compiled, compiled_with
 
 _LEAF = 4
 """Triangles of a leaf."""
@@ -105,9 +105,7 @@ def _nearest(
     distances: Float64Array,
 ) -> None:
     """Write slots (N,), weights (N, 3) and distances (N,), each search begun at the last slot."""
-    previous = int(
-        np.int64(0)
-    )  # a plain 0 would have a type of its own, and a search compiled for it
+    previous = int(np.int64(0))  # a plain 0 has a type of its own, for which a search is compiled
     for i in range(len(points)):
         slot, squared = nearest_slot(tree, points[i], previous)
         slots[i], distances[i], previous = slot, np.sqrt(squared), slot
@@ -150,7 +148,7 @@ def nearest_slot(tree: TriangleTree, point: Float64Array, guess: int) -> tuple[i
     return slot, best
 
 
-@compiled_inside
+@compiled_with(inside=True)
 def box_distance(point: Float64Array, low: Float64Array, high: Float64Array) -> float:
     """Return the squared distance from a point to a box."""
     total = 0.0
@@ -160,7 +158,7 @@ def box_distance(point: Float64Array, low: Float64Array, high: Float64Array) -> 
     return total
 
 
-@compiled_inside
+@compiled_with(inside=True)
 def triangle_distance(
     point: Float64Array, triangle: Float64Array
 ) -> tuple[float, float, float, float]:
@@ -228,7 +226,7 @@ def _crossings(tree: TriangleTree, points: Float64Array, axis: int, totals: Int6
                     totals[i] += sign
 
 
-@compiled_inside
+@compiled_with(inside=True)
 def line_crossing(triangle: Float64Array, axis: int, at_b: float, at_c: float) -> tuple[int, float]:
     """Return +1, -1 or 0 and where along `axis` the line (at_b, at_c) crosses a triangle.
 
@@ -252,7 +250,7 @@ def line_crossing(triangle: Float64Array, axis: int, at_b: float, at_c: float) -
     return turns, triangle[0, axis] + rise
 
 
-@compiled_inside
+@compiled_with(inside=True)
 def edge_crossing(
     start: Float64Array, end: Float64Array, b: int, c: int, at_b: float, at_c: float
 ) -> int:

@@ -63,6 +63,7 @@ _CAPSULES = np.array(
         [0, -250, -22, 62, -150, -275, -30, 58],
     ]
 )
+_GUARD = Lock()
 
 
 def default_head() -> Head:
@@ -74,9 +75,6 @@ def default_head() -> Head:
     """
     with _GUARD:  # threads that ask at the same time wait for one head
         return _make_head()
-
-
-_GUARD = Lock()
 
 
 @cache

@@ -13,7 +13,7 @@ from hairkit import Camera, Hull, Mask, Strands
 from hairkit.arrays import Float32Array, Int64Array
 from hairkit.field.sampling_kernels import copy_point
 from hairkit.field.view_fusion import DEPTH_SHRINK, FusedViews
-from hairkit.parallel import compiled, compiled_inside, compiled_with, parallel_for
+from hairkit.parallel import compiled, compiled_with, parallel_for
 from hairkit.types.volume import outer_products
 
 from .options import Options
@@ -178,7 +178,7 @@ def join(
     return turn + after
 
 
-@compiled_inside
+@compiled_with(inside=True)
 def _follow_line(photo: Photo, x: float, y: float, sign: float, line: Float32Array) -> int:
     """Write u, v, depth (M, 3) of a line from a pixel on, and return its number of points.
 

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hairkit.arrays import Float32Array, Int32Array, Int64Array
-from hairkit.parallel import compiled, compiled_inside, compiled_with
+from hairkit.parallel import compiled, compiled_with
 
 from .features import Pair, gather_feature
 
@@ -188,7 +188,7 @@ def _add(heap: Heap, waiting: int, bound: float, node: int) -> int:
     return waiting + 1
 
 
-@compiled_inside
+@compiled_with(inside=True)
 def _take_first(heap: Heap, waiting: int) -> int:
     """Remove the nearest cell; return how many are left."""
     last = waiting - 1

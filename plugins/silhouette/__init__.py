@@ -82,9 +82,7 @@ def _from_nothing(problem: TurnFit, search: Search, capture: Capture, options: O
         far = search.find(problem.start(False, FAR_DISTANCE), faceless)
         best = min(best, far, key=lambda fit: fit.cost)
     if options.model == "auto" and not capture.orthographic:
-        flat, _ = search.descend(
-            problem.start(True), FLAT_NOISE, min(FLAT_ROUNDS, options.iterations)
-        )
+        flat, _ = search.descend(problem.start(True), FLAT_NOISE, FLAT_ROUNDS)
         if search.cost(flat, problem.evidence(flat, 1.0)) < FLAT_HOPE * best.cost:
             best = min(best, search.settle(flat, 1), key=lambda fit: fit.cost)
     return best

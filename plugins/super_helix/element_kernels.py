@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float64Array
-from hairkit.parallel import compiled, compiled_inside, compiled_with
+from hairkit.parallel import compiled, compiled_with
 
 _TERMS = 10
 """Terms of the series below x = 1: the next is below rounding."""
@@ -33,7 +33,7 @@ def _sum(series: npt.NDArray[np.float64], x: float, terms: int) -> float:
     return total
 
 
-@compiled_inside
+@compiled_with(inside=True)
 def coefficients(x: float) -> tuple[float, float, float, float, float]:
     """Return sin(a)/a, (1 - cos a)/a^2, (a - sin a)/a^3 and slopes of the last two, x = a^2."""
     if x < 1.0:
@@ -132,7 +132,7 @@ def advance_frame(
         next_end[i] += end[i]
 
 
-@compiled_inside
+@compiled_with(inside=True)
 def place_clamped_end(
     head: Float64Array,
     point: Float64Array,

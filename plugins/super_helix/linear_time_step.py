@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hairkit.arrays import Float64Array
-from hairkit.parallel import compiled_inside, compiled_with
+from hairkit.parallel import compiled_with
 
 from .contact import Point, touch
 from .element_kernels import advance_frame, node, place_clamped_end, product, times, turns
@@ -60,7 +60,7 @@ class Chain(NamedTuple):
     """(n, 9) and the gradient."""
 
 
-@compiled_inside
+@compiled_with(inside=True)
 def _effective_seconds(step: Step, strand: Strand) -> float:
     """Return the time by which an acceleration changes the velocity in the step's formula."""
     return step.seconds * 2 / 3 if strand.two_step else step.seconds
@@ -159,7 +159,7 @@ def newton(
     return most
 
 
-@compiled_inside
+@compiled_with(inside=True)
 def _element(
     rods: Rods,
     motion: Motion,
@@ -238,7 +238,7 @@ def _add_point(
             gradient[j] += by[i, j] * pull[i]
 
 
-@compiled_inside
+@compiled_with(inside=True)
 def _add_isotropic_point(
     form: Float64Array,
     gradient: Float64Array,
@@ -270,7 +270,7 @@ def _add_isotropic_point(
             gradient[6 + j] += by_change[i, j] * pull[i]
 
 
-@compiled_inside
+@compiled_with(inside=True)
 def _advance_element(
     q: Float64Array, length: float, chain: Chain, k: int, scratch: Float64Array
 ) -> None:

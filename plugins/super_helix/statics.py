@@ -12,7 +12,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from hairkit.arrays import Float64Array
-from hairkit.parallel import compiled, compiled_inside, compiled_with, parallel_for
+from hairkit.parallel import compiled, compiled_with, parallel_for
 
 from .element_kernels import advance_frame, node, times, turns
 from .rods import NODES, SHARES, WEIGHTS, Rods
@@ -145,7 +145,7 @@ def _forces(
         hung += mass
 
 
-@compiled_inside
+@compiled_with(inside=True)
 def _in_frame(frame: Float64Array, vector: Float64Array, result: Float64Array) -> None:
     for j in range(3):
         result[j] = frame[0, j] * vector[0] + frame[1, j] * vector[1] + frame[2, j] * vector[2]

@@ -185,10 +185,7 @@ def inside_names(module: ast.Module) -> set[str]:
         node.name
         for node in ast.walk(module)
         if isinstance(node, ast.FunctionDef)
-        and any(
-            _last_name(one) == "compiled_inside" or "inside=True" in ast.unparse(one)
-            for one in node.decorator_list
-        )
+        and any("inside=True" in ast.unparse(one) for one in node.decorator_list)
     }
 
 
