@@ -336,8 +336,7 @@ def _smooth(view: _Seen, gain: Float32Array) -> Float32Array:
 
 def _shrink(picture: Float32Array, width: int) -> Float32Array:
     size = (width, len(picture) * width // picture.shape[1])
-    shrunk = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
-    return np.asarray(shrunk, np.float32)
+    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.float32)
 
 
 def _is_symmetric(surface: _Surface) -> bool:

@@ -55,7 +55,7 @@ def signed_distance(head: Surface, grid: VoxelGrid) -> Float32Array:
 
 def _within(cells: BoolArray, squared: float) -> BoolArray:
     """Return (X, Y, Z) the cells whose steps to one of `cells`, squared, are less than a number."""
-    reach, (depth, height, _) = math.isqrt(int(squared)), cells.shape
+    reach, (depth, height, _) = math.isqrt(math.ceil(squared) - 1), cells.shape
     room = np.pad(cells, ((reach, reach), (0, reach), (0, 0))).astype(np.uint8)
     steps = np.square(np.arange(-reach, reach + 1))
     found = np.zeros(cells.shape, np.bool_)

@@ -148,7 +148,7 @@ def test_grids_away_from_the_surface_are_still_measured() -> None:
         np.testing.assert_allclose(signed_distance(head, grid), wanted, atol=1e-4)
 
 
-@pytest.mark.parametrize("squared", [1.0, 5.0, 13.8, 30.0])
+@pytest.mark.parametrize("squared", [1.0, 5.0, 13.8, 16.0])
 def test_cells_near_others_equal_a_distance_transform(
     squared: float, rng: np.random.Generator
 ) -> None:
