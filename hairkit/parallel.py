@@ -35,15 +35,19 @@ def compiled(function: _Function) -> _Function:
     return compiled_with()(function)
 
 
-def compiled_with(*, allocates: bool = False, **options: Any) -> Callable[[_Function], _Function]:
+def compiled_with(
+    *, allocates: bool = False, inside: bool = False, **options: Any
+) -> Callable[[_Function], _Function]:
     """Return the same decorator with more of Numba's options: `fastmath=True`.
 
     `allocates` is for functions that make or return arrays. Those that return one are called by
-    Python alone: another compiled function would never free it.
+    Python alone: another compiled function would never free it. `inside` is for functions that
+    compiled ones alone call: they take a tenth less time to compile, and Python would crash.
     """
 
     def decorate(function: _Function) -> _Function:
         options["_nrt"] = allocates  # Numba's runtime, which counts references
+        options.update(no_cpython_wrapper=inside, no_cfunc_wrapper=True)
         made: Any = njit(nogil=True, error_model="numpy", **options)(function)
         made._cache = KernelCache(function)
         return cast(_Function, made)

@@ -187,7 +187,7 @@ def track_strand(
     return len(points)
 
 
-@compiled_with(allocates=True)
+@compiled_with(allocates=True, inside=True)
 def in_hull(volumes: Volumes, p: Float64Array) -> bool:
     """Return whether p (3,) lies in a cell of the hull."""
     cell = np.empty(3, np.int64)

@@ -295,7 +295,7 @@ def _grow_strands(
 
     `limits` (N, 2) are the most steps of each strand, and those on which it may slide.
     """
-    path = np.empty((limits[:, 0].max() + 1, 3))
+    path = np.empty((int(MAX_LENGTH / rules.step) + 3, 3))
     for k in range(first, last):
         s = order[k]
         count = _grow_strand(volume, rules, starts[s], limits[s], path)
@@ -313,12 +313,13 @@ def _resample(path: Float64Array, points: Float32Array) -> None:
             points[m, axis] = first + (path[before + 1, axis] - first) * (at - before)
 
 
-@compiled_with(allocates=True)
+@compiled_with(allocates=True, inside=True)
 def _grow_strand(
     volume: SignedVolume, rules: Rules, start: Float32Array, limits: Int64Array, path: Float64Array
 ) -> int:
     """Write one strand's points into path (M, 3); return their number, at least 2."""
-    p, d, found = np.empty(3), np.zeros(3), np.empty(5)
+    p, d, found = np.empty(3), np.empty(3), np.empty(5)
+    d[0], d[1], d[2] = 0.0, 0.0, 0.0
     copy_point(start, p)
     copy_point(p, path[0])
     count, inside = 1, 1
@@ -354,7 +355,7 @@ def _grow_strand(
     return count
 
 
-@compiled_with(allocates=True)
+@compiled_with(allocates=True, inside=True)
 def _slide(
     volume: SignedVolume, rules: Rules, back: float, p: Float64Array, d: Float64Array
 ) -> None:

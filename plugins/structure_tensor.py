@@ -153,7 +153,7 @@ def _tensor(
         parts[0] += (square_y - square_x) * weight
         parts[1] -= 2 * along_x * along_y * weight
         parts[2] += energy * weight
-    return np.dstack([*parts, core])
+    return np.asarray(cv2.merge([*parts, core]), np.float32)
 
 
 def _window_means(tensor: Float32Array, options: Options, scale: float) -> list[_Level]:

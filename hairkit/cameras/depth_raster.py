@@ -16,7 +16,7 @@ from hairkit.cameras.projection_kernels import (
     perspective_divisor,
     project,
 )
-from hairkit.parallel import compiled, parallel_for
+from hairkit.parallel import compiled, compiled_with, parallel_for
 from hairkit.types.camera import Camera
 from hairkit.types.head import Head
 
@@ -159,7 +159,7 @@ def _draw_faces(
             _draw_triangle(a, b, c, near, nearness)
 
 
-@compiled
+@compiled_with(inside=True)
 def _draw_triangle(a: Pixel, b: Pixel, c: Pixel, near: Vector, nearness: Float32Array) -> None:
     """Raise `nearness` (H, W) to a triangle of corners u, v, row by row.
 
@@ -194,7 +194,7 @@ def _draw_triangle(a: Pixel, b: Pixel, c: Pixel, near: Vector, nearness: Float32
                 nearness[y, left + k] = max(nearness[y, left + k], value)
 
 
-@compiled
+@compiled_with(inside=True)
 def _cut_span(first: float, last: float, weight: float, per: float) -> tuple[float, float]:
     """Return the part of a span, `first` to `last`, where `weight + k / per` is not negative."""
     end = -(weight + EDGE_SLACK) * per

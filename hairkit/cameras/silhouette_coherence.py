@@ -136,7 +136,7 @@ def _search_rays(
         _add_slopes(views, own, lines, z, distance, work, slope[n])
 
 
-@compiled
+@compiled_with(inside=True)
 def _draw_ray(views: _Views, own: int, right: float, down: float, lines: Float64Array) -> None:
     """Write the lines (V, LINE) in all views of a ray that is at (right, down, 1) for `own`."""
     scale = views.scale
@@ -156,7 +156,7 @@ def _draw_ray(views: _Views, own: int, right: float, down: float, lines: Float64
         lines[view, FASTEST] = STEEPEST * np.hypot(across, below) / scale
 
 
-@compiled
+@compiled_with(inside=True)
 def _best_on_ray(
     views: _Views, own: int, lines: Float64Array, distance: Float64Array
 ) -> tuple[float, float]:
@@ -187,7 +187,7 @@ def _best_on_ray(
     return _soft_distance(views, own, lines, z, distance), z
 
 
-@compiled
+@compiled_with(inside=True)
 def _ruled_out(lines: Float64Array, view: int, z: float, short: float) -> float:
     """Return how far behind depth z a view's distance stays too small by `short` pixels, metres."""
     depth = z * lines[view, DEPTH] + lines[view, DEPTH_START]
@@ -200,7 +200,7 @@ def _ruled_out(lines: Float64Array, view: int, z: float, short: float) -> float:
     return result
 
 
-@compiled
+@compiled_with(inside=True)
 def _soft_distance(
     views: _Views, own: int, lines: Float64Array, z: float, distance: Float64Array
 ) -> float:
@@ -221,7 +221,7 @@ def _soft_distance(
     return result
 
 
-@compiled
+@compiled_with(inside=True)
 def _smallest_distance(
     views: _Views, own: int, lines: Float64Array, z: float, bar: float, likely: int
 ) -> tuple[float, int]:
@@ -278,7 +278,7 @@ def _sample(views: _Views, lines: Float64Array, view: int, z: float) -> tuple[fl
     )
 
 
-@compiled
+@compiled_with(inside=True)
 def _add_slopes(
     views: _Views,
     own: int,
@@ -307,7 +307,7 @@ def _add_slopes(
             _add_slope(views, own, lines, z, view, distance[view] / total, work, slope)
 
 
-@compiled
+@compiled_with(inside=True)
 def _add_slope(
     views: _Views,
     own: int,
@@ -336,7 +336,7 @@ def _add_slope(
     slope[own, ZOOM] -= weight * (x * work[2, 0] + y * work[2, 1])
 
 
-@compiled
+@compiled_with(inside=True)
 def _add_moment(
     place: Float64Array, force: Float64Array, weight: float, motion: Float64Array
 ) -> None:

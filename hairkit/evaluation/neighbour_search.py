@@ -130,7 +130,7 @@ def _row(y: int, z: int) -> int:
     return (y * _PRIME_Y) ^ (z * _PRIME_Z)
 
 
-@compiled
+@compiled_with(inside=True)
 def _cell_of(value: float, cell: float) -> int:
     return math.floor(value / cell)
 
@@ -146,7 +146,7 @@ def _keys(points: Float32Array, cell: float, mask: int) -> Int64Array:
     return keys
 
 
-@compiled
+@compiled_with(inside=True)
 def _cosine_within(grid: HashGrid, i: int, queries: _Queries, q: int, distance: float) -> float:
     """Return the cosine between a query's and a sample's direction; 0 beyond `distance`."""
     square = 0.0
@@ -184,7 +184,7 @@ def _find_hits(
                 break
 
 
-@compiled
+@compiled_with(inside=True)
 def _search(
     grid: HashGrid, queries: _Queries, q: int, distance: float, cosine: float, want_free: bool
 ) -> int:
@@ -208,7 +208,7 @@ def _search(
     return best
 
 
-@compiled
+@compiled_with(inside=True)
 def _cells_about(value: float, distance: float, cell: float) -> tuple[int, int]:
     """Return the first and the last cell along an axis within a distance of a coordinate."""
     centre = np.float64(value)
@@ -236,7 +236,7 @@ def _follow_strands(
         shares[s] = followed.max() / (bounds[s + 1] - bounds[s])
 
 
-@compiled
+@compiled_with(inside=True)
 def _count_owners(
     grid: HashGrid,
     owner: Int64Array,

@@ -53,7 +53,7 @@ def sample_at(
         result[c] = v00 + (v10 - v00) * tx
 
 
-@compiled
+@compiled_with(inside=True)
 def copy_point(point: npt.NDArray[np.floating[Any]], target: npt.NDArray[np.floating[Any]]) -> None:
     """Write a point (3,) into another.
 

@@ -24,7 +24,7 @@ from hairkit.field.symmetric_eigen import smallest_eigenvectors
 from hairkit.field.unseen import add_surface_planes
 from hairkit.imaging.waves import remove_slant
 from hairkit.options import option
-from hairkit.parallel import compiled, parallel_for
+from hairkit.parallel import compiled, compiled_with, parallel_for
 from hairkit.types.camera import Camera
 from hairkit.types.mask import Mask
 from hairkit.types.orientation import OrientationMap
@@ -229,7 +229,7 @@ def add_planes(
         count[i] += 1
 
 
-@compiled
+@compiled_with(inside=True)
 def _plane_weight(view: OrientedView, fading: Fading, u: float, v: float, depth: float) -> float:
     """Return the weight of the view at pixel u, v for a cell at an axial depth."""
     weight = float(view.certainty[int(v), int(u)])
@@ -247,7 +247,7 @@ def _plane_weight(view: OrientedView, fading: Fading, u: float, v: float, depth:
     return weight if weight >= LEAST_WEIGHT else 0.0
 
 
-@compiled
+@compiled_with(inside=True)
 def _plane_normal(camera: PackedCamera, angle: float, x: float, y: float, z: float) -> Vector:
     """Return the normal of the plane of the viewing ray and the strand that it meets at x, y, z."""
     right, down, forward = camera.right, camera.down, camera.forward

@@ -44,12 +44,12 @@ def build_tree(vertices: npt.ArrayLike, faces: npt.ArrayLike) -> TriangleTree:
     face = np.minimum(order, count - 1)
     triangles = triangles[face]
     triangles[count:, 1:] = triangles[count:, :1]  # no ray crosses a point
-    middle = triangles.mean(axis=1)
+    middle = np.ascontiguousarray(triangles.mean(axis=1).T)
     for level in range(depth):
         parts = order.reshape(1 << level, -1)
-        centres = middle[parts]
-        axis = np.ptp(centres, axis=1).argmax(axis=1)
-        along = np.take_along_axis(centres, axis[:, None, None], axis=2)[..., 0]
+        centres = middle[:, parts]
+        axis = np.ptp(centres, axis=2).argmax(axis=0)
+        along = np.take_along_axis(centres, axis[None, :, None], axis=0)[0]
         order = np.take_along_axis(parts, along.argsort(axis=1, kind="stable"), axis=1).ravel()
     corners = np.ascontiguousarray(triangles[order])
     leaves = corners.reshape(1 << depth, -1, 3)
@@ -73,7 +73,8 @@ def nearest_on_surface(
     Points (N, 3) that follow each other in space are found fastest.
     """
     at = np.ascontiguousarray(points, np.float64).reshape(-1, 3)
-    slot, weights, distance = _nearest(tree, at)
+    slot, weights, distance = np.empty(len(at), np.int64), np.empty((len(at), 3)), np.empty(len(at))
+    _nearest(tree, at, slot, weights, distance)
     return tree.order[slot].astype(np.int32), weights, distance
 
 
@@ -83,34 +84,37 @@ def inside_surface(tree: TriangleTree, points: npt.ArrayLike) -> npt.NDArray[np.
     A ray's signed crossings are summed, so bodies may overlap and may be wound either way.
     """
     at = np.ascontiguousarray(points, np.float64).reshape(-1, 3)
-    votes = np.zeros(len(at), np.int64)
-    for axis in range(3):
-        votes += _crossings(tree, at, axis) != 0
-    return votes >= 2
+    inside, second = (_crossed(tree, at, axis) for axis in range(2))
+    split = inside != second
+    inside[split] = _crossed(tree, at[split], 2)
+    return inside
 
 
-@compiled_with(allocates=True)
+def _crossed(tree: TriangleTree, points: Float64Array, axis: int) -> npt.NDArray[np.bool_]:
+    totals = np.zeros(len(points), np.int64)
+    _crossings(tree, points, axis, totals)
+    return np.asarray(totals != 0)
+
+
+@compiled
 def _nearest(
-    tree: TriangleTree, points: Float64Array
-) -> tuple[Int64Array, Float64Array, Float64Array]:
-    """Return slots (N,), weights (N, 3) and distances (N,), each search begun at the last slot."""
-    count = len(points)
-    slots = np.zeros(count, np.int64)
-    weights = np.zeros((count, 3))
-    distances = np.zeros(count)
-    previous = int(
-        np.int64(0)
-    )  # a plain 0 would have a type of its own, and a search compiled for it
-    for i in range(count):
+    tree: TriangleTree,
+    points: Float64Array,
+    slots: Int64Array,
+    weights: Float64Array,
+    distances: Float64Array,
+) -> None:
+    """Write slots (N,), weights (N, 3) and distances (N,), each search begun at the last slot."""
+    previous = int(np.int64(0))  # a plain 0 has a type of its own, for which a search is compiled
+    for i in range(len(points)):
         slot, squared = nearest_slot(tree, points[i], previous)
         slots[i], distances[i], previous = slot, np.sqrt(squared), slot
         _, weights[i, 0], weights[i, 1], weights[i, 2] = triangle_distance(
             points[i], tree.corners[slot]
         )
-    return slots, weights, distances
 
 
-@compiled_with(allocates=True)
+@compiled_with(allocates=True, inside=True)
 def nearest_slot(tree: TriangleTree, point: Float64Array, guess: int) -> tuple[int, float]:
     """Return the slot of the nearest triangle and the squared distance, starting from a guess."""
     lower, upper, corners = tree.lower, tree.upper, tree.corners
@@ -144,7 +148,7 @@ def nearest_slot(tree: TriangleTree, point: Float64Array, guess: int) -> tuple[i
     return slot, best
 
 
-@compiled
+@compiled_with(inside=True)
 def box_distance(point: Float64Array, low: Float64Array, high: Float64Array) -> float:
     """Return the squared distance from a point to a box."""
     total = 0.0
@@ -154,7 +158,7 @@ def box_distance(point: Float64Array, low: Float64Array, high: Float64Array) -> 
     return total
 
 
-@compiled
+@compiled_with(inside=True)
 def triangle_distance(
     point: Float64Array, triangle: Float64Array
 ) -> tuple[float, float, float, float]:
@@ -193,12 +197,11 @@ def triangle_distance(
 
 
 @compiled_with(allocates=True)
-def _crossings(tree: TriangleTree, points: Float64Array, axis: int) -> Int64Array:
-    """Return (N,) the sums of signed crossings of the rays from points (N, 3) along +axis."""
+def _crossings(tree: TriangleTree, points: Float64Array, axis: int, totals: Int64Array) -> None:
+    """Add to totals (N,) the signed crossings of the rays from points (N, 3) along +axis."""
     lower, upper, corners = tree.lower, tree.upper, tree.corners
     first_leaf = len(lower) // 2
     b, c = (axis + 1) % 3, (axis + 2) % 3
-    totals = np.zeros(len(points), np.int64)
     stack = np.empty(_STACK, np.int64)
     for i in range(len(points)):
         p = points[i]
@@ -221,10 +224,9 @@ def _crossings(tree: TriangleTree, points: Float64Array, axis: int) -> Int64Arra
                 sign, height = line_crossing(corners[k], axis, p[b], p[c])
                 if sign != 0 and height > p[axis]:
                     totals[i] += sign
-    return totals
 
 
-@compiled
+@compiled_with(inside=True)
 def line_crossing(triangle: Float64Array, axis: int, at_b: float, at_c: float) -> tuple[int, float]:
     """Return +1, -1 or 0 and where along `axis` the line (at_b, at_c) crosses a triangle.
 
@@ -248,7 +250,7 @@ def line_crossing(triangle: Float64Array, axis: int, at_b: float, at_c: float) -
     return turns, triangle[0, axis] + rise
 
 
-@compiled
+@compiled_with(inside=True)
 def edge_crossing(
     start: Float64Array, end: Float64Array, b: int, c: int, at_b: float, at_c: float
 ) -> int:

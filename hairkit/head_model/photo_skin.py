@@ -270,10 +270,11 @@ def _blend(
         mean[part] += low[part] * view.weight[part][..., None]
         taken[part] += low[part] * share[part][..., None]
     mean = extend_tones(mean / np.maximum(total, LEAST)[..., None], (total > 0).astype(np.float32))
+    coarse = join_gradients(mean, smooth, shares) - taken
+    del smooth, mean, taken  # half as much memory as the details
     details = np.zeros((SIZE, SIZE, 3), np.float32)
     for view, photo, factor, share in zip(views, photos, factors, shares, strict=True):
         _add_photo(details, view, photo, factor, share)
-    coarse = join_gradients(mean, smooth, shares) - taken
     for rows in _strips():
         details[rows] += _enlarge_rows(coarse, rows)
     return details, total
@@ -335,8 +336,7 @@ def _smooth(view: _Seen, gain: Float32Array) -> Float32Array:
 
 def _shrink(picture: Float32Array, width: int) -> Float32Array:
     size = (width, len(picture) * width // picture.shape[1])
-    shrunk = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
-    return np.asarray(shrunk, np.float32)
+    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.float32)
 
 
 def _is_symmetric(surface: _Surface) -> bool:

@@ -7,8 +7,10 @@ signed crossings other than 0 there, which holds for overlapping parts and for i
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 from scipy.ndimage import distance_transform_edt, label
@@ -36,44 +38,43 @@ def signed_distance(head: Surface, grid: VoxelGrid) -> Float32Array:
     vertices, faces = closed_surface(head)
     tree, free = build_tree(vertices, faces), _without_surface(vertices[faces], grid)
     if free.all():
-        return (
-            _distances(tree, grid.centres().reshape(-1, 3)).reshape(grid.shape).astype(np.float32)
-        )
-    cells = np.sqrt(_squared_steps(free))
-    near = (cells - CROSSED) * grid.spacing < BAND
+        distance = _distances(tree, grid.centres().reshape(-1, 3)).astype(np.float32)
+        return distance.reshape(grid.shape)
+    near = _within(~free, (BAND / grid.spacing + CROSSED) ** 2)
     face, weights, exact = nearest_on_surface(tree, grid.centres_of(near))
     feet = np.einsum("nk,nkd->nd", weights, vertices[faces[face]])
     foot, beyond = np.zeros(grid.shape, np.int32), np.ones(grid.shape, np.bool_)
     foot[near], beyond[near] = np.arange(len(feet)), exact > BAND
-    distance = _distances_to(feet, foot[tuple(_nearest_cells(beyond))], grid)
+    nearest = distance_transform_edt(beyond, return_distances=False, return_indices=True)
+    distance = _distances_to(feet, foot[tuple(nearest)], grid)
     distance[near] = np.minimum(distance[near], exact)
-    inside, result = _inside(tree, grid, cells <= CROSSED), distance.astype(np.float32)
-    np.negative(result, out=result, where=inside)
-    return result
+    inside = _inside(tree, grid, _within(~free, CROSSED**2 + 1))
+    np.negative(distance, out=distance, where=inside)
+    return distance
 
 
-def _nearest_cells(free: BoolArray) -> Int32Array:
-    """Return (3, X, Y, Z) the nearest cell that is not free."""
-    cell: Int32Array = distance_transform_edt(free, return_distances=False, return_indices=True)
-    return cell
+def _within(cells: BoolArray, squared: float) -> BoolArray:
+    """Return (X, Y, Z) the cells whose steps to one of `cells`, squared, are less than a number."""
+    reach, (depth, height, _) = math.isqrt(math.ceil(squared) - 1), cells.shape
+    room = np.pad(cells, ((reach, reach), (0, reach), (0, 0))).astype(np.uint8)
+    steps = np.square(np.arange(-reach, reach + 1))
+    found = np.zeros(cells.shape, np.bool_)
+    for step in range(reach + 1):  # a ball is discs, and all layers of the volume are one picture
+        disc = (steps[:, None] + steps < squared - step**2).astype(np.uint8)
+        wide = cv2.dilate(room.reshape(-1, room.shape[2]), disc).reshape(room.shape) > 0
+        for first in (reach - step, reach + step):
+            found |= wide[first : first + depth, :height]
+    return found
 
 
-def _squared_steps(free: BoolArray) -> Int32Array:
-    """Return (X, Y, Z) the square of the cells to the nearest one that is not free."""
-    squared = np.zeros(free.shape, np.int32)
-    for axis, nearest in enumerate(_nearest_cells(free)):
-        own = np.arange(free.shape[axis], dtype=np.int32)
-        squared += np.square(np.moveaxis(np.moveaxis(nearest, axis, -1) - own, -1, axis))
-    return squared
-
-
-def _distances_to(feet: Float64Array, foot: Int32Array, grid: VoxelGrid) -> Float64Array:
+def _distances_to(feet: Float64Array, foot: Int32Array, grid: VoxelGrid) -> Float32Array:
     """Return (X, Y, Z) the distance of each cell's centre to its foot among `feet` (N, 3)."""
-    squared = np.zeros(grid.shape)
-    for axis, along in enumerate(grid.axes()):
-        apart = np.moveaxis(along - np.moveaxis(feet[:, axis][foot], axis, -1), -1, axis)
-        squared += apart * apart
-    return np.sqrt(squared, out=squared)
+    distance = np.empty(grid.shape, np.float32)
+    across, up, ahead = grid.axes()
+    for layer, x in enumerate(across):
+        apart = feet[foot[layer]] - np.stack(np.broadcast_arrays(x, up[:, None], ahead), axis=-1)
+        distance[layer] = np.sqrt(np.einsum("yzd,yzd->yz", apart, apart))
+    return distance
 
 
 def distance_to(head: Head, points: npt.ArrayLike) -> Float64Array:
@@ -151,9 +152,7 @@ def _inside(tree: TriangleTree, grid: VoxelGrid, near: BoolArray) -> BoolArray:
     part, count = label(~near)
     some = np.zeros(count + 1, np.int32)
     some[part.ravel()] = np.arange(part.size, dtype=np.int32)  # a cell of each part
-    at = [
-        axis[cell]
-        for axis, cell in zip(grid.axes(), np.unravel_index(some, near.shape), strict=True)
-    ]
+    cells = zip(grid.axes(), np.unravel_index(some, near.shape), strict=True)
+    at = [axis[cell] for axis, cell in cells]
     inside[~near] = inside_surface(tree, np.stack(at, axis=1))[part[~near]]
     return inside

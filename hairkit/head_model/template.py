@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from threading import Lock
 
 import numpy as np
 from scipy.spatial import ConvexHull, cKDTree
@@ -62,9 +63,9 @@ _CAPSULES = np.array(
         [0, -250, -22, 62, -150, -275, -30, 58],
     ]
 )
+_GUARD = Lock()
 
 
-@cache
 def default_head() -> Head:
     """Return the average adult head with two eyeballs, breadth 0.155 m, watertight.
 
@@ -72,6 +73,12 @@ def default_head() -> Head:
     of the neck's cut, the face below the middle), so they are injective. Every call returns
     the same object.
     """
+    with _GUARD:  # threads that ask at the same time wait for one head
+        return _make_head()
+
+
+@cache
+def _make_head() -> Head:
     directions, faces = _sphere(FREQUENCY)
     directions = _refine_regions(directions)
     vertices = head_surface(*_angles(directions))

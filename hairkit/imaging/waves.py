@@ -194,11 +194,13 @@ def _patches(
     """Yield patches of pictures and of hair that hold at least a share of hair; metres."""
     height, width, stride = (round(edge * RESOLUTION) for edge in (*shape, step))
     for picture, hair in views:
-        for top in range(0, picture.shape[0] - height + 1, stride):
-            for left in range(0, picture.shape[1] - width + 1, stride):
-                place = np.s_[top : top + height, left : left + width]
-                if hair[place].mean() >= filled:
-                    yield picture[place], hair[place]
+        sums = cv2.integral(hair)
+        sums = np.asarray(cv2.integral(hair))
+        sums = sums[height:] - sums[:-height]
+        share = (sums[:, width:] - sums[:, :-width]) / (height * width)
+        for top, left in stride * np.argwhere(share[::stride, ::stride] >= filled):
+            place = np.s_[top : top + height, left : left + width]
+            yield picture[place], hair[place]
 
 
 class _Repeats(NamedTuple):

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array, Int64Array
-from hairkit.parallel import compiled
+from hairkit.parallel import compiled, compiled_with
 
 Points = Float64Array | Float32Array
 """(P, 3) metres."""
@@ -160,7 +160,7 @@ def draw_points(
             points[i, 0], points[i, 1], points[i, 2] = x, y, z
 
 
-@compiled
+@compiled_with(inside=True)
 def _step_of(length: float, a: float, b: float, c: float) -> tuple[float, float, float]:
     """Return a vector's direction times a length."""
     size = length / math.sqrt(a * a + b * b + c * c + TINY)

@@ -160,9 +160,8 @@ def vertex_normals(vertices: npt.ArrayLike, faces: Int32Array) -> Float64Array:
     points = np.asarray(vertices, np.float64)
     corners = points[faces]
     face_normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    total = np.zeros_like(points)
-    for corner in range(3):
-        np.add.at(total, faces[:, corner], face_normals)
+    at, sums = faces.T.ravel(), [np.tile(part, 3) for part in face_normals.T]
+    total = np.stack([np.bincount(at, part, len(points)) for part in sums], axis=1)
     length = np.linalg.norm(total, axis=1, keepdims=True)
     result: Float64Array = total / np.maximum(length, 1e-20)
     return result

@@ -128,7 +128,7 @@ def _paint_cards(begin: int, end: int, sheet: _Sheet, atlas: Atlas) -> None:
                     before[k] = here[k]
 
 
-@compiled
+@compiled_with(inside=True)
 def _lay_ground(card: int, sheet: _Sheet, atlas: Atlas) -> None:
     """Give texels without hair the colour and direction of hair at their height."""
     x0, y0 = sheet.corner[card]
@@ -185,7 +185,7 @@ def _locate(
     return found
 
 
-@compiled
+@compiled_with(inside=True)
 def _normal(u: float, tx: float, ty: float, tz: float) -> tuple[float, float]:
     """Return x and y of the unit normal of a rounded card at `u`, -1 to 1 across it, square to a
     strand's unit tangent."""
@@ -250,7 +250,7 @@ def _line(
                 atlas.normal[cy, cx, 1] = int(UNIT * ny)
 
 
-@compiled
+@compiled_with(inside=True)
 def _card_length(line: Float64Array) -> float:
     total = 0.0
     for j in range(len(line) - 1):

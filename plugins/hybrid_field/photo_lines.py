@@ -178,7 +178,7 @@ def join(
     return turn + after
 
 
-@compiled
+@compiled_with(inside=True)
 def _follow_line(photo: Photo, x: float, y: float, sign: float, line: Float32Array) -> int:
     """Write u, v, depth (M, 3) of a line from a pixel on, and return its number of points.
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from hairkit import Hull, Strands
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array, Int64Array
-from hairkit.field.sampling_kernels import make_unit, sample_at
+from hairkit.field.sampling_kernels import copy_point, make_unit, sample_at
 from hairkit.field.smooth_volume import smooth_volume
 from hairkit.parallel import compiled, compiled_with
 from hairkit.types.volume import cell_slopes
@@ -90,10 +90,11 @@ def _draw(
                 for axis in range(3):
                     along[axis] = np.float64(points[i + 1, axis]) - points[i, axis]
                 make_unit(along)
-            sample_at(cells.origin, cells.spacing, cells.slopes, points[i], slope)
+            copy_point(points[i], at)
+            sample_at(cells.origin, cells.spacing, cells.slopes, at, slope)
             _across(along, slope, side)
             for axis in range(3):
-                at[axis] = (points[i, axis] - cells.origin[axis]) / cells.spacing
+                at[axis] = (at[axis] - cells.origin[axis]) / cells.spacing
                 side[axis] /= cells.spacing
             for k in range(len(shifts)):
                 x = min(max(int(at[0] + shifts[k] * side[0]), 0), rank.shape[0] - 1)

@@ -155,7 +155,7 @@ def _follow_cells(
         counts[s] = join(back, before, ahead, after, lines[s])
 
 
-@compiled_with(allocates=True)
+@compiled_with(allocates=True, inside=True)
 def _follow_tensors(
     tensors: TensorVolume,
     inside: Float32Array,

@@ -188,7 +188,7 @@ def _add(heap: Heap, waiting: int, bound: float, node: int) -> int:
     return waiting + 1
 
 
-@compiled
+@compiled_with(inside=True)
 def _take_first(heap: Heap, waiting: int) -> int:
     """Remove the nearest cell; return how many are left."""
     last = waiting - 1

@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hairkit.arrays import BoolArray, Float32Array, Int32Array
-from hairkit.parallel import compiled, compiled_with
+from hairkit.parallel import compiled_with
 
 from .features import (
     Pair,
@@ -200,7 +200,7 @@ def fill_level(
                 made.values[here + c] = example.values[there + c]
 
 
-@compiled
+@compiled_with(inside=True)
 def find_coherent(
     example: Pair,
     roots: Float32Array,

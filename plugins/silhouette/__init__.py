@@ -26,6 +26,8 @@ POOR_COST = 40.0
 photos alone, photographs of a bald man 72, and 44 from `FAR_DISTANCE`."""
 FLAT_NOISE = 4.0
 """Times the noise of outlines in the first rounds with orthographic cameras."""
+FLAT_ROUNDS = 6
+"""Rounds of that, of up to 16 that it would take to settle: its cost is within a tenth then."""
 FLAT_HOPE = 2.0
 """Times the best cost from which such a solution is not settled, which takes off a third: it is 10
 and more times on perspective captures, 0.4 times on an orthographic one."""
@@ -80,7 +82,7 @@ def _from_nothing(problem: TurnFit, search: Search, capture: Capture, options: O
         far = search.find(problem.start(False, FAR_DISTANCE), faceless)
         best = min(best, far, key=lambda fit: fit.cost)
     if options.model == "auto" and not capture.orthographic:
-        flat, _ = search.descend(problem.start(True), FLAT_NOISE, options.iterations)
+        flat, _ = search.descend(problem.start(True), FLAT_NOISE, FLAT_ROUNDS)
         if search.cost(flat, problem.evidence(flat, 1.0)) < FLAT_HOPE * best.cost:
             best = min(best, search.settle(flat, 1), key=lambda fit: fit.cost)
     return best

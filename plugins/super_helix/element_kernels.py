@@ -33,7 +33,7 @@ def _sum(series: npt.NDArray[np.float64], x: float, terms: int) -> float:
     return total
 
 
-@compiled
+@compiled_with(inside=True)
 def coefficients(x: float) -> tuple[float, float, float, float, float]:
     """Return sin(a)/a, (1 - cos a)/a^2, (a - sin a)/a^3 and slopes of the last two, x = a^2."""
     if x < 1.0:
@@ -113,7 +113,7 @@ def product(a: Float64Array, b: Float64Array, result: Float64Array) -> None:
             result[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
 
 
-@compiled_with(allocates=True)
+@compiled_with(allocates=True, inside=True)
 def advance_frame(
     q: Float64Array,
     length: float,
@@ -132,7 +132,7 @@ def advance_frame(
         next_end[i] += end[i]
 
 
-@compiled
+@compiled_with(inside=True)
 def place_clamped_end(
     head: Float64Array,
     point: Float64Array,

@@ -13,7 +13,7 @@ TWIST = 6
 """Coordinates of a twist (turn, move); those of the element's own change dq follow them."""
 
 
-@compiled_with(allocates=True)
+@compiled_with(allocates=True, inside=True)
 def eliminate(
     form: Float64Array,
     gradient: Float64Array,
@@ -108,7 +108,7 @@ def _join(
             b[6 + j] += spin[k, j] * pull[k] + shift[k, j] * pull[3 + k]
 
 
-@compiled
+@compiled_with(inside=True)
 def _invert(a: Float64Array) -> None:
     """Replace a symmetric matrix (3, 3) by its inverse."""
     p, q, r = a[0, 0], a[0, 1], a[0, 2]
@@ -131,7 +131,7 @@ def _invert(a: Float64Array) -> None:
     a[1, 2] = a[2, 1] = i4 * i5
 
 
-@compiled
+@compiled_with(inside=True)
 def _condense(a: Float64Array, b: Float64Array, tip: Float64Array, pull: Float64Array) -> None:
     """Eliminate dq: Schur complement in `tip`, A_qq^-1 A_qV in a[6:, :6], A_qq^-1 g in b[6:]."""
     inverse, across, below, own = a[TWIST:, TWIST:], a[:TWIST, TWIST:], a[TWIST:, :TWIST], b[TWIST:]

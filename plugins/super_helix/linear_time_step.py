@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hairkit.arrays import Float64Array
-from hairkit.parallel import compiled, compiled_with
+from hairkit.parallel import compiled_with
 
 from .contact import Point, touch
 from .element_kernels import advance_frame, node, place_clamped_end, product, times, turns
@@ -60,7 +60,7 @@ class Chain(NamedTuple):
     """(n, 9) and the gradient."""
 
 
-@compiled
+@compiled_with(inside=True)
 def _effective_seconds(step: Step, strand: Strand) -> float:
     """Return the time by which an acceleration changes the velocity in the step's formula."""
     return step.seconds * 2 / 3 if strand.two_step else step.seconds
@@ -85,7 +85,7 @@ def step_strands(
         _update_motion(rods, motion, step, own)
 
 
-@compiled_with(allocates=True)
+@compiled_with(allocates=True, inside=True)
 def _solve_step(
     rods: Rods,
     motion: Motion,
@@ -159,7 +159,7 @@ def newton(
     return most
 
 
-@compiled
+@compiled_with(inside=True)
 def _element(
     rods: Rods,
     motion: Motion,
@@ -210,7 +210,7 @@ def _element(
             _add_isotropic_point(form, gradient, arm, by_change, total, pull)
 
 
-@compiled_with(allocates=True)
+@compiled_with(allocates=True, inside=True)
 def _add_point(
     form: Float64Array,
     gradient: Float64Array,
@@ -238,7 +238,7 @@ def _add_point(
             gradient[j] += by[i, j] * pull[i]
 
 
-@compiled
+@compiled_with(inside=True)
 def _add_isotropic_point(
     form: Float64Array,
     gradient: Float64Array,
@@ -270,7 +270,7 @@ def _add_isotropic_point(
             gradient[6 + j] += by_change[i, j] * pull[i]
 
 
-@compiled
+@compiled_with(inside=True)
 def _advance_element(
     q: Float64Array, length: float, chain: Chain, k: int, scratch: Float64Array
 ) -> None:
@@ -287,7 +287,7 @@ def _advance_element(
     product(frames[k], slope, chain.shift[k])
 
 
-@compiled_with(allocates=True)
+@compiled_with(allocates=True, inside=True)
 def _update_motion(rods: Rods, motion: Motion, step: Step, strand: Strand) -> None:
     """Write the Gauss points of the new coordinates, and keep those of the step before."""
     h, two_step = _effective_seconds(step, strand), strand.two_step

@@ -106,7 +106,7 @@ def _slopes_of_all(
                         result[first + k, i, e, j] = (ahead[k, i] - back[k, i]) / (2 * step)
 
 
-@compiled_with(allocates=True)
+@compiled_with(allocates=True, inside=True)
 def _forces(
     rods: Rods, strand: int, q: Float64Array, gravity: Float64Array, result: Float64Array
 ) -> None:
@@ -145,7 +145,7 @@ def _forces(
         hung += mass
 
 
-@compiled
+@compiled_with(inside=True)
 def _in_frame(frame: Float64Array, vector: Float64Array, result: Float64Array) -> None:
     for j in range(3):
         result[j] = frame[0, j] * vector[0] + frame[1, j] * vector[1] + frame[2, j] * vector[2]

@@ -123,12 +123,13 @@ def build_hull(scene: Scene, masks: tuple[Mask, ...], options: Options) -> Hull:
     dressed = views if torso is None else views.in_front_of(torso)
     shell = Shell.of(scene, masks, torso) if views.mirrored else None
     grid = _grid_around_hair(scene, dressed, torso, shell, options)
+    if torso is not None and grid.origin[1] < torso.top:
+        views = dressed
+    del dressed  # a picture of depths for each view
     distance = signed_distance(scene.head, grid)
     outside, near = _room(grid, torso, shell, options)
     if options.cut_head:
         outside &= distance > 0
-    if torso is not None and grid.origin[1] < torso.top:
-        views = dressed
     loose, dense = _carve_both(grid, outside, near, views, options)
     scalp = _scalp_shell(scene, grid, distance) if options.cut_head else np.zeros(grid.shape, bool)
     shape = None if torso is None else torso.shape()

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from hairkit import VoxelGrid
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, UInt8Array
 from hairkit.cameras.projection_kernels import PackedCamera, project
-from hairkit.parallel import compiled, parallel_for
+from hairkit.parallel import compiled, compiled_with, parallel_for
 
 EMPTY, PERSON, HAIR, HIDDEN = 0, 1, 2, 3
 """Labels of pixels; as votes, PERSON means none, and HIDDEN hair of a view from which the head
@@ -145,7 +145,7 @@ def add_votes(
                         seen[ix, iy, iz] = True
 
 
-@compiled
+@compiled_with(inside=True)
 def _beyond_hair(
     u: float, v: float, shape: tuple[int, int], edges: tuple[bool, bool, bool, bool]
 ) -> bool:
@@ -155,7 +155,7 @@ def _beyond_hair(
     return (u < 0 and left) or (v < 0 and top) or (u >= width and right) or (v >= height and bottom)
 
 
-@compiled
+@compiled_with(inside=True)
 def _vote(label: int, surface: float, depth: float, margins: tuple[float, float]) -> int:
     """Return a view's vote on a cell: EMPTY, HAIR, HIDDEN, or PERSON for no vote.
 

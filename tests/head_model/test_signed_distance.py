@@ -7,9 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from scipy.ndimage import distance_transform_edt
 
 from hairkit.head_model.bvh import build_tree, inside_surface, nearest_on_surface
-from hairkit.head_model.signed_distance import BAND, closed_surface, distance_to, signed_distance
+from hairkit.head_model.signed_distance import (
+    BAND,
+    _within,
+    closed_surface,
+    distance_to,
+    signed_distance,
+)
 from hairkit.head_model.template import default_head
 from hairkit.types.head import Capsules, Head
 from hairkit.types.volume import VoxelGrid
@@ -139,6 +146,18 @@ def test_grids_away_from_the_surface_are_still_measured() -> None:
         grid = VoxelGrid.around(low, high, 0.01)
         wanted = np.linalg.norm(grid.centres().astype(np.float64), axis=3) - 0.08
         np.testing.assert_allclose(signed_distance(head, grid), wanted, atol=1e-4)
+
+
+@pytest.mark.parametrize("squared", [1.0, 5.0, 13.8, 16.0])
+def test_cells_near_others_equal_a_distance_transform(
+    squared: float, rng: np.random.Generator
+) -> None:
+    """Cells are near those that hold surface as SciPy's distances say, at the borders too."""
+    for shape in ((20, 17, 9), (3, 4, 5), (40, 1, 30)):
+        cells = rng.random(shape) < 0.01
+        cells.flat[0] = True
+        steps = np.rint(distance_transform_edt(~cells) ** 2)
+        np.testing.assert_array_equal(_within(cells, squared), steps < squared)
 
 
 def test_distance_is_the_same_every_time() -> None:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import json
+import time
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 
+from hairkit.head_model import template
 from hairkit.head_model.scalp import bind, evaluate
 from hairkit.head_model.template import default_head
 
@@ -32,10 +36,26 @@ def test_head_is_closed_and_wound_outward() -> None:
 
 def test_making_the_head_again_gives_the_same_arrays() -> None:
     """The head depends on nothing but the code; asked for twice it is the same object."""
-    again = default_head.__wrapped__()
+    again = template._make_head.__wrapped__()
     for name in ("vertices", "faces", "uv", "scalp", "landmark_vertices", "joints"):
         np.testing.assert_array_equal(getattr(again, name), getattr(default_head(), name))
     assert default_head() is default_head()
+
+
+def test_threads_that_ask_at_once_get_one_head(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The head is made once, however many threads ask before it is there."""
+    made: list[int] = []
+
+    def make() -> object:
+        made.append(len(made))
+        time.sleep(0.05)
+        return object()
+
+    monkeypatch.setattr(template, "_make_head", cache(make))
+    with ThreadPoolExecutor(4) as pool:
+        heads = [pool.submit(default_head) for _ in range(4)]
+    assert len({id(head.result()) for head in heads}) == 1
+    assert made == [0]
 
 
 def test_head_has_human_proportions() -> None:

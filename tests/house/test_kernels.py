@@ -179,6 +179,36 @@ def test_arrays_are_returned_to_python_alone(project: Path) -> None:
     assert array_callers(found) == []
 
 
+def inside_names(module: ast.Module) -> set[str]:
+    """Return the functions of a module that compiled functions alone may call."""
+    return {
+        node.name
+        for node in ast.walk(module)
+        if isinstance(node, ast.FunctionDef)
+        and any("inside=True" in ast.unparse(one) for one in node.decorator_list)
+    }
+
+
+def names_in_python(node: ast.AST, compilers: set[str]) -> Iterator[str]:
+    """Yield the names that are used where no function is compiled."""
+    if not _decorated(node) & compilers:
+        yield from {_last_name(node)} if isinstance(node, ast.Name | ast.Attribute) else ()
+        for child in ast.iter_child_nodes(node):
+            yield from names_in_python(child, compilers)
+
+
+def test_what_is_compiled_for_kernels_is_called_by_kernels(project: Path) -> None:
+    """Python names no function that has no entry for it: a call would end the process."""
+    folders = ("hairkit", "plugins", "tests", "benchmarks", "studies", "examples")
+    files = [file for folder in folders for file in (project / folder).rglob("*.py")]
+    sources = [file.read_text() for file in files]
+    modules, compilers = [ast.parse(source) for source in sources], decorators(sources)
+    inside = {name for module in modules for name in inside_names(module)}
+    assert len(inside) > 40
+    called = [inside & {*names_in_python(module, compilers)} for module in modules]
+    assert [(f, names) for f, names in zip(files, called, strict=True) if names] == []
+
+
 def test_faults_of_kernels_are_found() -> None:
     """Untyped and many parameters, columns by number, arrays that kernels get from others; points
     and slices are left alone."""
