@@ -194,7 +194,6 @@ def _patches(
     """Yield patches of pictures and of hair that hold at least a share of hair; metres."""
     height, width, stride = (round(edge * RESOLUTION) for edge in (*shape, step))
     for picture, hair in views:
-        sums = cv2.integral(hair)
         sums = np.asarray(cv2.integral(hair))
         sums = sums[height:] - sums[:-height]
         share = (sums[:, width:] - sums[:, :-width]) / (height * width)
