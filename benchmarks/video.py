@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import re
 import resource
 import tempfile
 from collections.abc import Sequence
@@ -25,14 +26,15 @@ import numpy as np
 from hairkit.arrays import Float64Array
 from hairkit.evaluation import Prediction, read_prediction, strand_scores
 from hairkit.evaluation.align import align, alignment_points, camera_errors
+from hairkit.evaluation.prediction import SCENE
 from hairkit.head_model.template import default_head
-from hairkit.io.video import read_video
 from hairkit.pipeline.recipe import load_recipe
 from hairkit.pipeline.reconstruct import reconstruct
 from hairkit.pipeline.run_record import RECORD
 from hairkit.rendering.picture import draw_views
 from hairkit.stages import EXPORT
 from hairkit.synth import STYLES, grow
+from hairkit.synth.photographs import Shoot, cluttered_room
 from hairkit.types.camera import Camera
 from hairkit.types.groom import Groom
 
@@ -59,9 +61,9 @@ def main() -> None:
     for style in args.styles:
         with tempfile.TemporaryDirectory() as made:
             film = shoot(grow(style, default_head(), STRANDS, args.seed), Path(made), args.seed)
-            for source, numbers in film.numbers().items():
-                rows[source].append(film.figures(source, numbers))
-                print(_row(style, source, rows[source][-1]), flush=True)
+            for source, figures in rows.items():
+                figures.append(film.figures(source))
+                print(_row(style, source, figures[-1]), flush=True)
     for source, figures in rows.items():
         print(_row("mean", source, np.mean(figures, axis=0).tolist()))
 
@@ -79,13 +81,7 @@ class Film:
     folder: Path
     cameras: list[Camera]
 
-    def numbers(self) -> dict[str, list[int]]:
-        """Return the frames that each source shows, in the order of its views."""
-        views = read_video(self.folder / "film.mp4", max(SIZE)).views
-        chosen = [int(view.photo_path.name.partition("#")[2]) for view in views if view.photo_path]
-        return {"8 photos": photo_numbers(), "film": chosen}
-
-    def figures(self, source: str, numbers: list[int]) -> list[float]:
+    def figures(self, source: str) -> list[float]:
         """Reconstruct a source and return its row."""
         photos = self.folder / ("film.mp4" if source == "film" else "photos")
         recipe = load_recipe("default")
@@ -96,6 +92,8 @@ class Film:
         seconds = _processor_seconds() - began
         lights = [each["light"] for each in json.loads((out / RECORD).read_text())["health"]]
         counts = lights.count("red"), lights.count("amber")
+        shown = [view["photo"] for view in json.loads((out / SCENE).read_text())["views"]]
+        numbers = [int(re.findall(r"\d+", photo)[-1]) for photo in shown]  # in the turn's order
         return [*self._scores(read_prediction(out), numbers), *counts, seconds]
 
     def _scores(self, found: Prediction, numbers: list[int]) -> list[float]:
@@ -119,13 +117,15 @@ def photo_numbers() -> list[int]:
 def shoot(groom: Groom, folder: Path, seed: int) -> Film:
     """Write `film.mp4` and `photos/` of a groom into a folder."""
     generator = np.random.default_rng(seed)
-    cameras, room = drifting_cameras(generator), still_room(generator)
+    cameras, shot = drifting_cameras(generator), Shoot.prepare(groom, generator)
+    room = cluttered_room(cameras[0], generator)
     (folder / "photos").mkdir()
     code = cv2.VideoWriter.fourcc(*"mp4v")
     film = cv2.VideoWriter(str(folder / "film.mp4"), code, RATE, SIZE)
     for first in range(0, FRAMES, 10):
         some = cameras[first : first + 10]
-        pictures = draw_views(groom, None, some, backgrounds=[room] * len(some), bust=True)
+        still = {"lights": shot.lights, "backgrounds": [room] * len(some), "solids": [shot.torso]}
+        pictures = draw_views(groom, None, some, **still)
         for number, picture in enumerate(pictures, first):
             frame = np.ascontiguousarray(picture[..., ::-1])
             film.write(frame)
@@ -162,17 +162,6 @@ def drifting_cameras(generator: np.random.Generator) -> list[Camera]:
         )
         for k in range(FRAMES)
     ]
-
-
-def still_room(generator: np.random.Generator) -> np.ndarray:
-    """Return a picture (H, W, 3) of furniture out of focus."""
-    room = np.full((SIZE[1], SIZE[0], 3), generator.uniform(120, 200), np.uint8)
-    for _ in range(12):
-        corner, size = generator.uniform(0, SIZE, 2), generator.uniform(0.1, 0.4, 2) * SIZE
-        low, high = corner.astype(int), (corner + size).astype(int)
-        colour = generator.uniform(60, 230, 3).tolist()
-        cv2.rectangle(room, low.tolist(), high.tolist(), colour, -1)
-    return cv2.GaussianBlur(room, (0, 0), 15)
 
 
 def _processor_seconds() -> float:

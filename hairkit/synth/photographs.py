@@ -117,7 +117,7 @@ def photograph(
     for name in ("photos", "masks", "truth/orientation"):
         (base / name).mkdir(parents=True, exist_ok=True)
     generator = np.random.default_rng([seed, 7])
-    shoot = _Shoot.prepare(groom, generator)
+    shoot = Shoot.prepare(groom, generator)
     turn = _turn(views)
     cameras = _cameras(list(turn.values()), size, jitter, orthographic, generator)
     stems = [f"{i}_{name}" if views == len(TURN) else name for i, name in enumerate(turn)]
@@ -146,7 +146,7 @@ def _turn(views: int) -> dict[str, float]:
 
 
 @dataclass(frozen=True)
-class _Shoot:
+class Shoot:
     """Hair, clothes and lights, the same in all photos."""
 
     groom: Groom
@@ -154,7 +154,8 @@ class _Shoot:
     lights: Lights
 
     @classmethod
-    def prepare(cls, groom: Groom, generator: np.random.Generator) -> _Shoot:
+    def prepare(cls, groom: Groom, generator: np.random.Generator) -> Shoot:
+        """Choose clothes and lights."""
         bust = Bust.under(groom.head)
         cloth = np.array(CLOTHS[generator.integers(len(CLOTHS))], np.float32)
         colours = np.broadcast_to(cloth, bust.vertices.shape).copy()
@@ -166,7 +167,7 @@ class _Shoot:
 
     def photos(self, cameras: list[Camera], generator: np.random.Generator) -> list[UInt8Array]:
         """Return the photos (H, W, 3) RGB: room, person, sensor noise."""
-        rooms = [_cluttered_room(camera, generator) for camera in cameras]
+        rooms = [cluttered_room(camera, generator) for camera in cameras]
         pictures = draw_views(
             self.groom, None, cameras, lights=self.lights, backgrounds=rooms, solids=[self.torso]
         )
@@ -231,7 +232,7 @@ def _as_sensed(picture: UInt8Array, generator: np.random.Generator) -> UInt8Arra
     return np.asarray(np.clip(np.rint(noisy), 0, 255), np.uint8)
 
 
-def _cluttered_room(camera: Camera, generator: np.random.Generator) -> UInt8Array:
+def cluttered_room(camera: Camera, generator: np.random.Generator) -> UInt8Array:
     """Return an out-of-focus background (H, W, 3): a wall, furniture, now and then a window."""
     size = np.array([camera.width, camera.height])
     wall = generator.uniform(*WALL_GREYS) + generator.uniform(-WALL_TINT, WALL_TINT, 3)
