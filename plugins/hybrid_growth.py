@@ -6,10 +6,11 @@ field without signs the tensors are followed in the direction in which the growt
 
 Added to the patent, and off in the recipe `patent`: a strand that leaves the hair goes on for a
 while (`patience`, the uncertain steps of the thesis) and is cut where it left; a strand that slides
-is turned back to the surface (`pull`) and ends farther outside (`bound`), because its tip hangs
-below what all views agree on; a strand that meets the shoulders turns along them (`turn_sine`); and
-hair that photos show and no strand reaches gets strands of its own (`cover`,
-`hairkit.grooming.cover_hair`). Inertia, too, is an addition.
+is turned back to the surface (`pull`); one that stands out of the side ends at the surface
+(`LEFT`), others farther outside (`bound`), because their tips hang below what all views agree on; a
+strand that meets the shoulders turns along them (`turn_sine`); and hair that photos show and no
+strand reaches gets strands of its own (`cover`, `hairkit.grooming.cover_hair`). Inertia, too, is an
+addition.
 """
 
 from __future__ import annotations
@@ -53,6 +54,12 @@ GROWTH = 4
 """Channel of the growth potential."""
 MAX_LENGTH = 1.2
 """Metres of the longest strand."""
+LEFT = 1.1
+"""Internal distance at which a strand that stands out of the hair's side or top has left it: there
+the tips of true strands are at 1.00 to 1.09 (medians of nine heads), below at 1.03 to 1.85, for
+they hang below what all views agree on."""
+BELOW = -0.5
+"""Upward part of the surface's normal under which a strand stands the hair below."""
 CENTIMETRES = 100
 """Of a metre: the unit of the internal distance where the field has none of its own."""
 
@@ -63,7 +70,10 @@ class Options(FinishOptions):
 
     step: float = option(0.001, low=1e-4, high=0.01, unit="m", doc="Length of a step (delta).")
     bound: float = option(
-        1.6, low=1, high=10, doc="Internal distance at which a strand has left the hair."
+        1.6,
+        low=1,
+        high=10,
+        doc="Internal distance at which a strand has left the hair, below it or along its surface.",
     )
     reach: float = option(
         2.0,
@@ -322,11 +332,13 @@ def _grow_strand(
     d[0], d[1], d[2] = 0.0, 0.0, 0.0
     copy_point(start, p)
     copy_point(p, path[0])
-    count, inside = 1, 1
+    count, inside, stands = 1, 1, False
     for i in range(1, limits[0] + 1):
         sample_at(volume.origin, volume.spacing, volume.values, p, found)
         known = make_unit(found[:3])
-        if i <= rules.blind_steps or (known and found[DISTANCE] <= rules.bound):
+        if i <= rules.blind_steps or (
+            known and found[DISTANCE] <= (LEFT if stands else rules.bound)
+        ):
             inside = i
         elif i - inside > rules.patience_steps:
             break
@@ -339,10 +351,10 @@ def _grow_strand(
                 d[axis] = rules.sign * found[axis]
         if not make_unit(d):
             break
-        slides = rules.slide_sine > 0 and i < limits[1]
-        if slides and found[DISTANCE] >= rules.slide_from:
+        stands = False
+        if rules.slide_sine > 0 and found[DISTANCE] >= rules.slide_from:
             back = rules.pull * (found[DISTANCE] - rules.slide_from)
-            _slide(volume, rules, back, p, d)
+            stands = _slide(volume, rules, back, p, d, i < limits[1])
         for axis in range(3):
             p[axis] += rules.step * d[axis]
         copy_point(p, path[count])
@@ -357,19 +369,26 @@ def _grow_strand(
 
 @compiled_with(allocates=True, inside=True)
 def _slide(
-    volume: SignedVolume, rules: Rules, back: float, p: Float64Array, d: Float64Array
-) -> None:
-    """Bend d along the hair's surface, and `back` into the hair, where it slides or turns."""
+    volume: SignedVolume, rules: Rules, back: float, p: Float64Array, d: Float64Array, slides: bool
+) -> bool:
+    """Bend d along the hair's surface, and `back` into the hair, where it `slides` or turns.
+
+    Return whether it stands out of the hair, but for below.
+    """
     normal = np.empty(3)
     distance = volume.values[..., DISTANCE : DISTANCE + 1]
     gradient_at(volume.origin, volume.spacing, distance, p, normal)
     outward = d[0] * normal[0] + d[1] * normal[1] + d[2] * normal[2]
     if outward < rules.slide_sine:
-        for axis in range(3):
-            d[axis] -= (max(outward, 0.0) + back) * normal[axis]
-        make_unit(d)
-    elif p[1] < rules.shoulders:
+        if slides:
+            for axis in range(3):
+                d[axis] -= (max(outward, 0.0) + back) * normal[axis]
+            make_unit(d)
+        return False
+    if slides and p[1] < rules.shoulders:
         _turn(volume, rules, back, p, normal, d)
+        return False
+    return bool(normal[1] > BELOW)
 
 
 @compiled_with(allocates=True)

@@ -8,7 +8,6 @@ prior), so that only the cameras remain unknown.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,9 +23,6 @@ JAW_NOISE, COVERED_NOISE = 2.0, 3.0
 """Times the noise of given landmarks of the jaw, and of those under hair: detectors guess them."""
 FACES = 4
 """Views that show the face in a turn of eight, at most."""
-STEEP_DEG, STEEP_NOISE = 43.0, 3.0
-"""Yaw of faces whose landmarks are off, and times whose noise they then have: with true cameras
-those of faces seen from 57 and 62 degrees, whose yaws are 44 and 46, are off by 5 to 6 mm."""
 MIDLINE = np.array([27, 28, 29, 30, 33, 51, 57, 8])
 """Nose, lips and chin: they lie on the outline of a view from the side."""
 AFFINE_SPREAD, SMOOTH_SPREAD, SMOOTH_LENGTH = 0.004, 0.004, 0.04
@@ -42,11 +38,14 @@ above let it vary by 3.6 %. Cameras pull it, too, all one way: with 0.02 the sca
 0.93 to 0.99, with 0.012 it is 0.95 to 1.00."""
 
 
-def steep_faces(views: Sequence[View]) -> list[bool]:
-    """Return which views show a face that is turned too far, where more than `FACES` show one."""
-    if sum(view.landmarks is not None for view in views) <= FACES:
-        return [False] * len(views)
-    return [view.face is not None and abs(view.face.yaw_deg) > STEEP_DEG for view in views]
+def landmark_noise(view: View, usual: float = 1.0) -> Float64Array:
+    """Return the standard deviation (68,) of a view's landmarks, pixels.
+
+    `usual` is that of points that are not on the jaw, where the detector tells none.
+    """
+    if view.face is not None and view.face.noise_px.all():
+        return view.face.noise_px
+    return np.where(np.arange(LANDMARKS) < JAW_LANDMARKS, JAW_NOISE, 1.0) * usual
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,17 +72,14 @@ class Sights:
         shown = sum(view.landmarks is not None for view in capture.views)
         usual = np.broadcast_to(noise, len(masks))
         crowded = np.sqrt(max(1.0, shown / FACES))
-        steep = steep_faces(capture.views)
         for index, (view, mask) in enumerate(zip(capture.views, masks, strict=True)):
             if view.landmarks is None:
                 continue
-            own = np.where(np.arange(LANDMARKS) < JAW_LANDMARKS, JAW_NOISE, 1.0) * usual[index]
-            if view.face is not None and view.face.noise_px.all():
-                own = view.face.noise_px
+            own = landmark_noise(view, usual[index])
             for point, (x, y) in enumerate(view.landmarks):
                 inside = 0 <= x < view.width and 0 <= y < view.height
                 covered = inside and mask.labels[int(y), int(x)] == HAIR
-                trust = (COVERED_NOISE if covered else 1.0) * (STEEP_NOISE if steep[index] else 1.0)
+                trust = COVERED_NOISE if covered else 1.0
                 rows.append((index, point, x, y, own[point] * trust * crowded))
         return cls.of_rows(rows)
 

@@ -15,7 +15,6 @@ import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.cameras.depth_raster import HEAD_TOLERANCE, SPLAT_CELLS, head_depth, point_depth
-from hairkit.cameras.landmark_equations import steep_faces
 from hairkit.field.cell_shells import dense_surface
 from hairkit.field.growth_prior import PARTED_HAIR
 from hairkit.pipeline.drawn_hair import (
@@ -184,8 +183,7 @@ def assess_landmarks(capture: Capture, scene: Scene) -> tuple[Figure, ...]:
     if corners is None:
         return tuple(figures)
     points = scene.head.vertices[corners].astype(np.float64)
-    steep = steep_faces([view for view, _ in known])
-    known = [each for each, far in zip(known, steep, strict=True) if not far]
+    known = [(view, camera) for view, camera in known if view.face is None or not view.face.steep]
     gaps = [_misfit_mm(camera, points, view.landmarks) for view, camera in known]
     if gaps:
         worst = known[int(np.argmax(gaps))][0]
@@ -316,7 +314,7 @@ def assess_strands(groom: Groom, roots: int, hair_length: float) -> tuple[Figure
 
 
 def assess_drawing(
-    shown: Sequence[PhotoHair], scene: Scene, groom: Groom, slant: float = 0.0
+    shown: Sequence[PhotoHair], scene: Scene, groom: Groom, slant: float
 ) -> tuple[Figure, ...]:
     """Return how the drawn guides agree with the photos: directions, where hair is, and curls.
 

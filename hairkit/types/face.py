@@ -16,6 +16,9 @@ SURE_PRESENCE, SURE_YAW_DEG = 0.95, 55.0
 """Least presence and largest yaw of a face to be relied on: four of 18 rendered profiles were found
 as faces with presence 0.87 to 1.00 and yaw 39 to 62 degrees instead of 82 to 96."""
 
+STEEP_YAW_DEG = 47.0
+"""Yaw from which landmarks are off by 5 mm and more: it is found in faces seen from 52 degrees."""
+
 
 @dataclass(frozen=True, eq=False)
 class Face(Stored):
@@ -53,6 +56,11 @@ class Face(Stored):
         Detectors mistake some profiles for oblique faces, with high presence.
         """
         return self.presence >= SURE_PRESENCE and abs(self.yaw_deg) <= SURE_YAW_DEG
+
+    @property
+    def steep(self) -> bool:
+        """True for faces turned so far that their landmarks are off."""
+        return abs(self.yaw_deg) > STEEP_YAW_DEG
 
     @classmethod
     def absent(cls) -> Self:

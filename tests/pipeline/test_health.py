@@ -24,6 +24,7 @@ from hairkit.rendering.picture import draw_views
 from hairkit.synth import grow
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture, View
+from hairkit.types.face import Face
 from hairkit.types.groom import Groom
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
 from hairkit.types.orientation import OrientationMap, wrap_angle
@@ -81,6 +82,7 @@ class Run:
         self.hair_length = HAIR_LENGTH
         self.parting = Parting.at(0.0, skin_share=0.02, spread=0.012)
         self.tied = TiedHair()
+        self.waves = Waves()
 
     def _mask(self, camera: Camera) -> Mask:
         head = self.scene.head
@@ -105,6 +107,7 @@ class Run:
             scalp_distance=replace(DISTANCE, hair_length=self.hair_length),
             parting=self.parting,
             tied=self.tied,
+            waves=self.waves,
         )
         every = assess(self.capture, evidence, self.groom, self.roots, self.turn)
         return {f"{figure.stage}: {figure.name}": figure for figure in every}
@@ -276,6 +279,26 @@ def test_a_fault_turns_its_figure_red(name: str, run: Run) -> None:
     figures = run.figures()
     assert figures[name].light == RED
     assert figures[name].line() in summarise(list(figures.values()))
+
+
+def test_curls_that_turn_one_way_are_judged_by_their_directions(run: Run) -> None:
+    """Their locks run one way in the photos, as straight hair does: that is no fault."""
+    curled(run)
+    run.waves = Waves(0.005, 0.02, 0.3)
+    names = run.figures()
+    assert "strands: direction of curly hair" not in names
+    assert "strands: directions as photographed" in names
+
+
+def test_landmarks_of_a_steep_face_are_not_judged(run: Run) -> None:
+    """They are off where the cameras are right."""
+    steep = Face(1.0, np.full((68, 2), 5.0), np.ones(68), 52.0, 0.0, 0.0)
+    first, *others = run.capture.views
+    run.capture = Capture((replace(first, landmarks=steep.landmarks, face=steep), *others))
+    assert run.figures()["cameras: landmarks off by"].light == GREEN
+    front = replace(steep, yaw_deg=10.0)
+    run.capture = Capture((replace(first, landmarks=front.landmarks, face=front), *others))
+    assert run.figures()["cameras: landmarks off by"].light == RED
 
 
 def test_notes_name_the_photos(run: Run) -> None:

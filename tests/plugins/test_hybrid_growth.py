@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from hairkit_plugins.hybrid_growth import Options, grow, signed_volume, track
+from hairkit_plugins.hybrid_growth import BELOW, LEFT, Options, grow, signed_volume, track
 
 from hairkit.arrays import Float32Array
 from hairkit.field.growth_prior import measure_scalp_distance
@@ -68,6 +68,15 @@ def test_a_strand_ends_where_the_internal_distance_passes_the_bound() -> None:
     np.testing.assert_allclose(found.tips[:, 0], 0.1, atol=1.5e-3)
 
 
+@pytest.mark.parametrize(("way", "end"), [((1, 0, 0), 0.1), ((0, 1, 0), 0.1), ((0, -1, 0), 0.15)])
+def test_strands_that_stand_end_at_the_surface(way: tuple[float, float, float], end: float) -> None:
+    """Out of side and top they end where I is `LEFT`; below, where it is `bound`."""
+    distance = (1 + GRID.centres() @ np.array(way)).astype(np.float32)
+    options = replace(FREE, reach=5.0, blind=0.0, bound=1.15, slide_sine=0.5)
+    found = run(constant(way), distance, options, way=0.05)
+    np.testing.assert_allclose(found.tips @ np.array(way), end, atol=2.5e-3)
+
+
 def test_no_strand_ends_on_its_blind_way() -> None:
     """Roots lie outside what the photos show as hair: the first way is free."""
     outside = np.full(GRID.shape, 3.0, np.float32)
@@ -87,7 +96,7 @@ def test_strands_slide_along_the_surface_they_meet_at_a_small_angle() -> None:
     )
     assert flat.tips[0, 0] > 0.03
     assert flat.tips[0, 1] < 0.012
-    assert steep.tips[0, 1] > 0.03
+    assert 0.008 < steep.tips[0, 1] < 0.013
 
 
 def falling(growth: tuple[float, float, float]) -> OrientationField:
@@ -165,12 +174,12 @@ def growth_twin(
 ) -> list[np.ndarray]:
     """One strand by the rules, in NumPy; it slides on the first `free` steps."""
     p, d = start.astype(np.float64), np.zeros(3)
-    path, inside, patience = [p], 1, round(options.patience / options.step)
+    path, inside, patience, stands = [p], 1, round(options.patience / options.step), False
     for i in range(1, steps + 1):
         found = GRID.sample(values, p[None])[0].astype(np.float64)
         size = np.linalg.norm(found[:3])
         blind = i * options.step <= options.blind + 1e-9
-        if blind or (found[3] <= options.bound and size > 1e-9):
+        if blind or (found[3] <= (LEFT if stands else options.bound) and size > 1e-9):
             inside = i
         elif i - inside > patience:
             break
@@ -178,11 +187,13 @@ def growth_twin(
             keep = options.inertia if i > 1 else 0.0
             d = keep * d + (1 - keep) * found[:3] / size
         d = d / np.linalg.norm(d)
-        if i < free and found[3] >= options.slide_from:
+        stands = False
+        if found[3] >= options.slide_from:
             probes = p + GRID.spacing * np.concatenate([np.eye(3), -np.eye(3)])
             level = GRID.sample(values, probes)[:, 3].astype(np.float64)
             normal = (level[:3] - level[3:]) / np.linalg.norm(level[:3] - level[3:])
-            if d @ normal < options.slide_sine:
+            stands = d @ normal >= options.slide_sine and normal[1] > BELOW
+            if i < free and d @ normal < options.slide_sine:
                 back = options.pull * (found[3] - options.slide_from)
                 d = d - (max(d @ normal, 0) + back) * normal
                 d = d / np.linalg.norm(d)
