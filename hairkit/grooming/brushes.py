@@ -26,9 +26,9 @@ SHORTEST = 0.002
 """Least length of what is left of a strand that is cut, metres."""
 RISE = 0.03
 """Metres from the root after which a strand follows a parting or a puff wholly."""
-OVER = 2.0
-"""Reach of a parting by which hair that lies across it is laid over: wholly within half of the
-radius, so that a parting can be moved by two fingers' width with one stroke."""
+OVER = 16.0
+"""Reach of a parting by which hair that lies across it is laid over: wholly within 0.87 radii. With
+2 or 4 a moved parting leaves strands across the face, halfway between both sides."""
 GOLDEN = (np.sqrt(5) - 1) / 2
 """Turns between the curls of one strand and the next, which so begin anywhere."""
 NEIGHBOURS = 8
