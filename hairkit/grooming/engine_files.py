@@ -25,7 +25,7 @@ _HEAD = EngineFile("head.fbx", "fbx")
 ENGINES = {
     "unreal": (_hair({"axis": "unreal", "hairs": 50_000}), _HEAD),
     "unity": (_hair({"hairs": 20_000}), _HEAD),
-    "blender": (_hair({"hairs": 20_000}), _HEAD),
+    "blender": (_hair({"hairs": 20_000, "split": True}), _HEAD),
     "maya": (
         _hair({"axis": "y_up_centimetres", "hairs": 20_000}),
         EngineFile("guides.ma", "maya", {"strands": "guides"}),

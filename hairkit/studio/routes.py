@@ -17,6 +17,7 @@ from starlette.responses import FileResponse, JSONResponse, Response, StreamingR
 from starlette.routing import Route
 
 from hairkit.errors import HairkitError, one_line
+from hairkit.grooming.brushes import BRUSHES
 from hairkit.io.capture_reader import EDITS
 from hairkit.io.capture_toml import HeadEntry
 from hairkit.options import make_options, option
@@ -29,7 +30,7 @@ from hairkit.studio.result_page import result_page
 from hairkit.studio.studio import BUILD_S, EXPORT_S, PHOTO_S, Studio
 from hairkit.studio.uploads import receive_file, receive_json
 from hairkit.types.chosen import ChosenHair
-from hairkit.types.edits import Edits
+from hairkit.types.edits import GROUPS, Edits
 
 TURNS = (8, 12, 16, 24)
 """Numbers of views of a guided turn."""
@@ -288,8 +289,8 @@ class Routes:
             return Response(read_bytes(path), media_type="image/png")
 
     async def _edits(self, request: Request) -> Response:
-        strokes = {"strokes": self._studio.project.edits.values()}
-        return JSONResponse(strokes | await self._studio.editor.call("brushes", PHOTO_S, {}))
+        strokes = self._studio.project.edits.values()
+        return JSONResponse({"strokes": strokes, "brushes": [*BRUSHES], "groups": [*GROUPS]})
 
     async def _edit(self, request: Request) -> Response:
         """Keep the strokes over the hair: all of them, so that undoing one is leaving it out."""

@@ -288,7 +288,8 @@ class Studio:
         self._set_build(state="running", share=0.0, words="a quick preview")
         change = asyncio.create_task(self._stop_on_change())
         try:
-            await self._call_drafter(touched, self.project.draft)
+            done = await self._call_drafter(touched, self.project.draft)
+            self.build |= {"astray": done.get("astray", [])}
             self._tell()
         except TaskError:
             pass  # the whole run follows, and says what is wrong
@@ -303,7 +304,7 @@ class Studio:
             await self._call_drafter([], unseen)
         unseen.unlink(missing_ok=True)
 
-    async def _call_drafter(self, touched: list[str], packet: Path) -> None:
+    async def _call_drafter(self, touched: list[str], packet: Path) -> Any:
         values = {
             "folder": str(self.project.folder),
             "packet": str(packet),
@@ -315,7 +316,7 @@ class Studio:
             "guides": min(DRAFT_GUIDES, self.guides),
         }
         task = "edit" if touched == [EDITS] else "draft"
-        await self.drafter.call(task, BUILD_S, values)
+        return await self.drafter.call(task, BUILD_S, values)
 
     async def _stop_on_change(self) -> None:
         await self._wanted.wait()

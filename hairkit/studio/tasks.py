@@ -7,6 +7,7 @@ their own (`task_child`), so that a picture that crashes a decoder ends one task
 from __future__ import annotations
 
 import json
+import logging
 import zipfile
 from collections.abc import Callable
 from dataclasses import asdict
@@ -19,9 +20,10 @@ import numpy as np
 
 from hairkit.api import export_for
 from hairkit.arrays import Float32Array, Float64Array, Int32Array, UInt8Array
-from hairkit.errors import HairkitError
+from hairkit.errors import HairkitError, InputError
+from hairkit.grooming import brushes
 from hairkit.grooming.brushed_hair import Hair
-from hairkit.grooming.brushes import BRUSHES, brush_hair
+from hairkit.grooming.brushes import brush_hair
 from hairkit.grooming.densify import roots_between
 from hairkit.grooming.engine_files import ENGINES
 from hairkit.head_model.scalp import roots_at
@@ -53,7 +55,7 @@ from hairkit.studio.photo_tasks import (
     manager,
     prepare_photo,
 )
-from hairkit.types.edits import GROUPS, Edits, read_edits
+from hairkit.types.edits import Edits, read_edits
 from hairkit.types.groom import Groom
 from hairkit.types.head import Roots
 
@@ -128,6 +130,7 @@ def build_groom(request: dict[str, Any], tell: Tell) -> Any:
         "length_cm": round(100 * float(hair.lengths().mean()), 1),
         "health": [[figure.light, figure.line()] for figure in health],
         "pose": _matrix(capture.chosen.head).tolist(),
+        "astray": _edited(Path(request["folder"]), capture.chosen.edits)[1],
     }
 
 
@@ -149,10 +152,12 @@ def draft_groom(request: dict[str, Any], tell: Tell) -> Any:
 
 
 def edit_groom(request: dict[str, Any], tell: Tell) -> Any:
-    """Write the `packet` of the last run's groom with the strokes that lie over it now."""
+    """Write the `packet` of the last run's groom with the strokes that lie over it now; returns a
+    line about each that went `astray`, as a build does."""
     folder = Path(request["folder"])
-    _hair_packet(_edited(folder, read_edits(folder / EDITS)), request)
-    return {}
+    groom, astray = _edited(folder, read_edits(folder / EDITS))
+    _hair_packet(groom, request)
+    return {"astray": astray}
 
 
 def show_stroke(request: dict[str, Any], tell: Tell) -> Any:
@@ -179,20 +184,33 @@ def _page_hair(folder: Path, made: int, edits: str) -> Hair:
     """Return the page's guides after strokes as JSON."""
     from hairkit.studio.hair_packet import page_guides
 
-    return Hair.of(page_guides(_edited(folder, Edits.of(json.loads(edits), EDITS))))
+    return Hair.of(page_guides(_edited(folder, Edits.of(json.loads(edits), EDITS))[0]))
 
 
-def _edited(folder: Path, edits: Edits) -> Groom:
-    """Return the groom of the last run after strokes."""
-    groom = _unedited(folder, _made(folder))
-    return (
-        load_recipe("default").ask(manager(), EDITED, groom=groom, edits=edits) if edits else groom
-    )
+def _edited(folder: Path, edits: Edits) -> tuple[Groom, list[str]]:
+    """Return the groom of the last run after strokes, and a line about each that fits no more."""
+    groom, log = _unedited(folder, _made(folder)), logging.getLogger(brushes.__name__)
+    told: list[str] = []
+
+    def keep(record: logging.LogRecord) -> bool:
+        told.append(record.getMessage())
+        return True
+
+    log.addFilter(keep)
+    try:
+        if edits:
+            groom = load_recipe("default").ask(manager(), EDITED, groom=groom, edits=edits)
+    finally:
+        log.removeFilter(keep)
+    return groom, told
 
 
 @lru_cache(maxsize=1)
 def _unedited(folder: Path, made: int) -> Groom:
-    return LastRun(folder / "result" / "work").latest(UNEDITED)
+    last = LastRun(folder / "result" / "work")
+    if not last.has(UNEDITED):
+        raise InputError("strokes are kept, and show once the hair is made again")
+    return last.latest(UNEDITED)
 
 
 def _made(folder: Path) -> int:
@@ -220,11 +238,6 @@ def list_formats(request: dict[str, Any], tell: Tell) -> Any:
     found = [(name, manager().info(name).format) for name in manager().names("export_groom")]
     plugins = [[name, format_.suffixes[0]] for name, format_ in found if format_ and format_.there]
     return {"formats": [*([_FOR + engine, f"-{engine}.zip"] for engine in ENGINES), *plugins]}
-
-
-def list_brushes(request: dict[str, Any], tell: Tell) -> Any:
-    """Return the names of the brushes, and of the groups of hair that they act on."""
-    return {"brushes": [*BRUSHES], "groups": [*GROUPS]}
 
 
 def draw_guides(request: dict[str, Any], tell: Tell) -> Any:
@@ -274,7 +287,6 @@ TASKS: dict[str, Callable[[dict[str, Any], Tell], Any]] = {
     "edit": edit_groom,
     "stroke": show_stroke,
     "formats": list_formats,
-    "brushes": list_brushes,
     "guides": draw_guides,
     "pose": describe_pose,
 }

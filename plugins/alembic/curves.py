@@ -52,6 +52,8 @@ class GroomCurves:
     """Guides of each curve; None where there are none to follow."""
     attributes: bool
     """False: curves, widths and uv alone."""
+    split: bool
+    """Whether each group is an object of its own."""
     curl: tuple[float, float] | None
     """Radius and pitch of the helices that strands are wound into, in the file's unit, or None."""
     cache: PointCache | None
@@ -100,6 +102,7 @@ def groom_curves(ready: PreparedGroom, options: Options) -> GroomCurves:
         guide=guide if marked else None,
         closest=closest_guides(strands) if listed and marked and guide.any() else None,
         attributes=listed,
+        split=options.split and len(np.unique(group)) > 1,
         curl=_curl(ready.groom.material, space) if listed else None,
         cache=cache,
         space=space,

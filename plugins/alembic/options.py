@@ -32,3 +32,6 @@ class Options(SpaceOptions, ImportOptions, AnimationOptions, ExportOptions):
         doc="Write the groom_* attributes (ids, groups, guides and their weights, colours); false"
         " leaves curves, widths and uv, which is all that Blender and Unity read.",
     )
+    split: bool = option(
+        False, doc="Write each group as an object of its name: Blender reads no groom_group_id."
+    )

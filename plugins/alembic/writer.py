@@ -13,6 +13,7 @@ import imath
 import numpy as np
 from alembic3d import Abc, AbcCoreAbstract, AbcGeom
 
+from hairkit.arrays import BoolArray
 from hairkit.errors import InputError
 from hairkit.storage import replace_file
 from hairkit.system import utf8_name
@@ -83,7 +84,8 @@ def _size(curves: GroomCurves) -> int:
     # colours are three numbers a point, as places are
     size = sum(array.nbytes for array in arrays) + (frames + 1) * curves.points.nbytes
     # also each curve's number, guide flag, and three guides with weights
-    return size + 32 * len(curves.counts) + _HEADER_BYTES * (frames + _ATTRIBUTES)
+    objects = len(set(curves.group_names)) if curves.split else 1
+    return size + 32 * len(curves.counts) + objects * _HEADER_BYTES * (frames + _ATTRIBUTES)
 
 
 def _write(curves: GroomCurves, part: Path) -> None:
@@ -95,11 +97,14 @@ def _write(curves: GroomCurves, part: Path) -> None:
     if curves.cache is not None:
         step, start = 1.0 / curves.cache.frames_per_second, float(curves.cache.times[0])
         sampling = archive.addTimeSampling(AbcCoreAbstract.TimeSampling(step, start))
-    schema = AbcGeom.OCurves(groom, "strands", sampling).getSchema()
-    for number in range(1 if curves.cache is None else len(curves.cache)):
-        schema.set(_sample(curves, number))
-    if curves.attributes:
-        _write_attributes(schema.getArbGeomParams(), curves)
+    names = np.asarray(curves.group_names if curves.split else [""] * len(curves.counts))
+    for name in np.unique(names):
+        parent = AbcGeom.OXform(groom, str(name)) if name else groom  # Blender takes its name
+        schema = AbcGeom.OCurves(parent, "strands", sampling).getSchema()
+        for number in range(1 if curves.cache is None else len(curves.cache)):
+            schema.set(_sample(curves, number, names == name))
+        if curves.attributes:
+            _write_attributes(schema.getArbGeomParams(), curves, names == name)
 
 
 def _write_groom_properties(groom: Any, curves: GroomCurves) -> None:
@@ -118,44 +123,45 @@ def _write_groom_properties(groom: Any, curves: GroomCurves) -> None:
             Abc.ODoubleProperty(properties, f"hairkit_curl_{name}").setValue(length)
 
 
-def _sample(curves: GroomCurves, number: int) -> Any:
-    """Return a frame's sample; what does not change is in the first, and repeated by reference.
+def _sample(curves: GroomCurves, number: int, own: BoolArray) -> Any:
+    """Return a frame's sample of some curves (S,); what does not change is in the first, and
+    repeated by reference.
 
     Setters leave weights, orders and knots out; the constructor would write empty ones, which a
     reader could take for a NURBS curve without knots.
     """
-    sample = AbcGeom.OCurvesSchemaSample()
+    sample, rows = AbcGeom.OCurvesSchemaSample(), np.repeat(own, curves.counts)
     sample.setType(AbcGeom.CurveType.kLinear)
     sample.setWrap(AbcGeom.CurvePeriodicity.kNonPeriodic)
     sample.setBasis(AbcGeom.BasisType.kNoBasis)
-    sample.setPositions(_imath(curves.frame(number)))
+    sample.setPositions(_imath(curves.frame(number)[rows]))
     if number == 0:
-        widths, uv = _imath(curves.widths), _imath(curves.root_uv)
-        sample.setCurvesNumVertices(_imath(curves.counts))
+        widths, uv = _imath(curves.widths[rows]), _imath(curves.root_uv[own])
+        sample.setCurvesNumVertices(_imath(curves.counts[own]))
         sample.setWidths(AbcGeom.OFloatGeomParamSample(widths, _VERTEX))
         sample.setUVs(AbcGeom.OV2fGeomParamSample(uv, _UNIFORM))
     return sample
 
 
-def _write_attributes(attributes: Any, curves: GroomCurves) -> None:
-    """Write the curves' groom attributes, of the types and scopes of Epic's table."""
-    number = np.arange(len(curves.counts), dtype=np.int32)
+def _write_attributes(attributes: Any, curves: GroomCurves, own: BoolArray) -> None:
+    """Write the groom attributes of some curves (S,), of the types and scopes of Epic's table."""
+    number, rows = np.flatnonzero(own).astype(np.int32), np.repeat(own, curves.counts)
     _write_attribute(attributes, "groom_id", "Int32", _UNIFORM, number)
-    _write_attribute(attributes, "groom_group_id", "Int32", _UNIFORM, curves.group)
+    _write_attribute(attributes, "groom_group_id", "Int32", _UNIFORM, curves.group[own])
     if len(np.unique(curves.group)) > 1:
         names = imath.StringArray(len(number))
-        for at, name in enumerate(curves.group_names):
-            names[at] = name
+        for at, place in enumerate(number.tolist()):
+            names[at] = curves.group_names[place]
         sample = AbcGeom.OStringGeomParamSample(names, _UNIFORM)
         AbcGeom.OStringGeomParam(attributes, "groom_group_name", False, _UNIFORM, 1).set(sample)
-    _write_attribute(attributes, "groom_root_uv", "V2f", _UNIFORM, curves.root_uv)
-    _write_attribute(attributes, "hairkit_root_density", "Float", _UNIFORM, curves.density)
-    _write_attribute(attributes, "groom_color", "V3f", _VERTEX, curves.colour.at())
+    _write_attribute(attributes, "groom_root_uv", "V2f", _UNIFORM, curves.root_uv[own])
+    _write_attribute(attributes, "hairkit_root_density", "Float", _UNIFORM, curves.density[own])
+    _write_attribute(attributes, "groom_color", "V3f", _VERTEX, curves.colour.at()[rows])
     if curves.guide is not None:
-        guide = curves.guide.astype(np.int32)
+        guide = curves.guide[own].astype(np.int32)
         _write_attribute(attributes, "groom_guide", "Int32", _UNIFORM, guide)
     if curves.closest is not None:
-        guides, weights = curves.closest.guides, curves.closest.weights
+        guides, weights = curves.closest.guides[own], curves.closest.weights[own]
         _write_attribute(attributes, "groom_closest_guides", "V3i", _UNIFORM, guides)
         _write_attribute(attributes, "groom_guide_weights", "V3f", _UNIFORM, weights)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from hairkit.grooming.prepare_export import point_colours
 from hairkit.head_model.skinning import JOINT_NAMES, head_weights
 from hairkit.manager import Manager
 from hairkit.types.groom import Groom
+from hairkit.types.strands import PLANTED
 
 OPERATORS = {".abc": "wm.alembic_import", ".usda": "wm.usd_import", ".usdc": "wm.usd_import"}
 ALL = pytest.mark.parametrize("ending", OPERATORS)
@@ -92,6 +94,20 @@ def test_the_head_nods_with_its_hair(
     np.testing.assert_allclose(only(things, "MESH")["frames"][:, scalp], skin, atol=2e-6)
     strands = z_up(moved(cache.head_from_rest, groom.strands.points))
     np.testing.assert_allclose(only(things, "CURVES")["frames"], strands, atol=2e-6)
+
+
+def test_groups_of_alembic_are_objects(
+    blender: BlenderSession, manager: Manager, groom: Groom, tmp_path: Path
+) -> None:
+    """With `split` brows and hair are hair curves of these names, point by point."""
+    brows = np.arange(len(groom.strands)) % 3 == 0
+    group = np.where(brows, PLANTED["brows"], 0)
+    grouped = replace(groom, strands=replace(groom.strands, group=group))
+    path = written(manager, grouped, tmp_path / "hair.abc", split=True)
+    things = blender.call("contents.imported", path=path, operator="wm.alembic_import")
+    for name, mask in (("brows", brows), ("hair_0", ~brows)):
+        wanted = z_up(groom.strands.select(mask).points)
+        np.testing.assert_allclose(only(things, "CURVES", name)["positions"], wanted, atol=1e-7)
 
 
 def test_usd_carries_what_is_said_of_strands(

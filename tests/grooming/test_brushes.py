@@ -96,6 +96,24 @@ def test_a_parting_sends_hair_to_both_sides() -> None:
     assert (moved[near] * side[near] > 0).all()
 
 
+def test_a_parting_can_be_moved() -> None:
+    """Hair that is combed over to the right lies left of a new line right of it; it keeps its
+    lengths, and lies flat."""
+    away = Brush("comb", 0.06, 1.0)
+    over = np.array([[0.06, 0.13, 0], [0, 0.135, 0], [-0.06, 0.13, 0]])
+    combed = brushed(GROOM.strands, *3 * [Edit(over, away)])
+    line = np.array([[-0.02, 0.1, -0.05], [-0.02, 0.112, 0], [-0.02, 0.1, 0.05]])
+    made = brushed(combed, Edit(line, Brush("part", 0.06, 0.005)))
+    root = combed.roots
+    near = (root[:, 0] > -0.018) & (root[:, 0] < 0.005) & (np.abs(root[:, 2]) < 0.04)
+    near &= root[:, 1] > 0.08
+    before, after = ((each.tips - root)[near, 0] for each in (combed, made))
+    assert (before < -0.01).sum() >= 3
+    assert (after > 0).all()
+    np.testing.assert_allclose(after, -before, atol=0.012)
+    np.testing.assert_allclose(made.lengths(), combed.lengths(), rtol=1e-4)
+
+
 def test_lengths_are_cut_and_grown() -> None:
     """A trim leaves no strand longer, a cut ends where the brush is, growing adds its amount."""
     everywhere = np.zeros((0, 3))

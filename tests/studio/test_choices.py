@@ -228,7 +228,7 @@ def test_strokes_over_the_hair_are_kept(server: Any) -> None:
     assert server.ask("GET", "/api/edits").json["strokes"] == [kept]
     early = server.ask("POST", "/api/edits/stroke", {"stroke": stroke})
     assert early.status == 422
-    assert "run all stages first" in early.json["error"]
+    assert early.json["error"] == "strokes are kept, and show once the hair is made again"
     assert read_capture_edits(server.folder) == [kept]
 
 

@@ -16,7 +16,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import pytest
 from studio_browser import GUIDES, OPTION, SLOW_S, USED, opened
 from studio_keys import go, step, tab_to
 
@@ -307,65 +306,3 @@ def download(page: Any, link: Any, path: Path) -> None:
     with page.expect_download(timeout=1000 * SLOW_S) as caught:
         page.keyboard.press("Enter")
     caught.value.save_as(path)
-
-
-def test_a_brush_is_led_by_keys(page: Any, story: Any) -> None:
-    """A stroke by keys shows at once and is kept; undone it is gone, also after a reload, where it
-    can still be had again."""
-    go(page, story, "hair")
-    page.locator("#hair[data-skin]").wait_for()
-    page.get_by_role("combobox", name="Brush").select_option("comb")
-    tab_to(page, "Hair on a head")
-    before = page.evaluate("Array.from(document.querySelector('#hair').hairMotion.rest)")
-    page.keyboard.press("p")
-    for _ in range(3):
-        page.keyboard.press("ArrowRight")
-    page.wait_for_function(SHAPED, arg=[before, 0.005])
-    with page.expect_response("**/api/result/draft*"):
-        page.keyboard.press("p")
-    [stroke] = strokes_over_hair(story)
-    assert stroke["brush"] == "comb"
-    assert len(stroke["path"]) == 4
-    page.get_by_role("button", name="Undo").click()
-    page.locator("button:disabled", has_text="Undo").wait_for()
-    while strokes_over_hair(story):
-        page.wait_for_timeout(50)
-    page.reload()
-    page.get_by_role("button", name="Redo").click()
-    page.locator("button:enabled", has_text="Undo").wait_for()
-    while not strokes_over_hair(story):
-        page.wait_for_timeout(50)
-    assert strokes_over_hair(story) == [stroke]
-
-
-@pytest.mark.parametrize("brush", ["puff", "cut", "curl", "thin", "dye"])
-def test_a_brush_shows_while_it_is_led(page: Any, story: Any, brush: str) -> None:
-    """Other brushes than the comb show before they are lifted, too; dropped, nothing is left."""
-    go(page, story, "hair")
-    page.locator("#hair[data-skin]").wait_for()
-    page.get_by_role("combobox", name="Brush").select_option(brush)
-    tab_to(page, "Hair on a head")
-    of = "tints" if brush == "dye" else "rest"
-    changed = SHAPED.replace("rest", of)
-    before = page.evaluate(f"Array.from(document.querySelector('#hair').hairMotion.{of})")
-    assert page.get_by_label("Colour of the dye").is_visible() == (brush == "dye")
-    kept = strokes_over_hair(story)
-    page.keyboard.press("p")
-    for _ in range(3):
-        page.keyboard.press("ArrowDown")
-    page.wait_for_function(changed, arg=[before, 0.002])
-    page.keyboard.press("Escape")
-    page.wait_for_function(f"(given) => !({changed})(given)", arg=[before, 1e-6])
-    assert strokes_over_hair(story) == kept
-
-
-SHAPED = """([before, least]) => {
-  const now = document.querySelector('#hair').hairMotion.rest;
-  return before.some((value, k) => Math.abs(value - now[k]) > least);
-}"""
-
-
-def strokes_over_hair(story: Any) -> Any:
-    """Return the strokes that the project keeps."""
-    path = story.folder / "edits.json"
-    return json.loads(path.read_text())["strokes"] if path.is_file() else []

@@ -12,9 +12,9 @@ const USES = {
   ply: "any tool", tressfx: "TressFX", cyhair: "CyHair", usc_data: "research",
   cards: "Hair cards",
 };
-const DRAFT = "This is a quick preview of your last change: the cameras are those of the hair "
-  + "before, the grid is coarser, and there are fewer guides. The whole hair is being made and "
-  + "takes its place here; files are those of the hair before until then.";
+const DRAFT = "This is a quick preview of your last change. After a stroke on a photo its cameras "
+  + "are those of the hair before, its grid is coarser, and it has fewer guides. The whole hair is "
+  + "being made and takes its place here; files are those of the hair before until then.";
 
 export function show(main) {
   let shown = "", side = null;
@@ -42,6 +42,7 @@ export function show(main) {
         { class: "stage", id: "hair", "aria-label": "The hair in motion" });
       close = showHair(stage, packet, { seen, brush });
       side = new Side();
+      if (astray().length) say(astray().join(" · ")); // on a phone the files are not seen
       refill(main, make("div", { class: "split" }, stage, side.element));
     } catch (error) {
       const now = await get("/api/project").catch(() => state);
@@ -90,6 +91,9 @@ class Side {
   }
 }
 
+// What is said of strokes that reach no hair any more.
+function astray() { return state.build.astray ?? []; }
+
 function offers() {
   const health = (state.build.health ?? []).map(([light, line]) =>
     make("li", { class: light }, line.replace(`${light} `, "").trim()));
@@ -99,6 +103,7 @@ function offers() {
     formats.filter(([, suffix]) => suffix.endsWith(".zip") === zip));
   return [
     state.draft ? make("p", { class: "note-box", role: "status" }, DRAFT) : null,
+    ...astray().map((line) => make("p", { class: "note-box" }, line)),
     make("h2", {}, "Take it with you"),
     make("a", { class: "button primary", href: "/api/result/page", download: "result.html" },
       "Save result.html"),

@@ -2,6 +2,7 @@
 import { get, make, say, send } from "./api.js";
 
 const FINEST_M = 0.002; // between places of a path
+const AMOUNT = "Amount: from 0 to 1, metres or a share; 0.03 is 3 cm";
 const KEPT = "undone strokes"; // in the storage of the tab, so that a reload loses none
 
 export class HairBrush {
@@ -17,7 +18,7 @@ export class HairBrush {
     });
     this.amount = make("input", {
       type: "number", min: "0", max: "1", step: "any", placeholder: "usual",
-      "aria-label": "Amount: metres, or a share",
+      "aria-label": "Amount: metres, or a share", title: AMOUNT,
     });
     this.colour = make("input", {
       type: "color", value: "#7a4a2a", "aria-label": "Colour of the dye",
@@ -44,7 +45,9 @@ export class HairBrush {
   choose() {
     for (const setting of this.settings) setting.hidden = !this.name;
     this.colour.hidden = this.name !== "dye";
-    send("POST", "/api/edits/stroke", { stroke: { path: [[9, 9, 9]] } }).catch(() => {});
+    if (!this.name) return;
+    send("POST", "/api/edits/stroke", { stroke: { path: [[9, 9, 9]] } })
+      .catch((error) => say(error.message));
   }
 
   async load() {
@@ -64,6 +67,10 @@ export class HairBrush {
 
   // Goes on to a place; returns whether it is far enough from the one before.
   draw(at) {
+    if (!this.amount.validity.valid) {
+      say(AMOUNT);
+      return false;
+    }
     const last = this.path?.at(-1);
     if (last && Math.hypot(...at.map((v, k) => v - last[k])) < FINEST_M) return false;
     this.path = [...this.path ?? [], at];
@@ -85,9 +92,9 @@ export class HairBrush {
 
   // The stroke as far as it is drawn.
   stroke() {
-    const { name: brush, radius, path, amount: { value, validity } } = this;
+    const { name: brush, radius, path, amount: { value } } = this;
     const [group, mirror] = [this.group.value, this.mirror.checked];
-    const amount = value && validity.valid ? Number(value) : null;
+    const amount = value ? Number(value) : null;
     return { brush, radius, mirror, group, path, amount, colour: this.colour.value };
   }
 

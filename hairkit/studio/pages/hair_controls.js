@@ -82,9 +82,14 @@ class HairControls {
   }
 
   down(event) {
+    if (!this.pointers.size) this.kind = event.pointerType;
+    else if (event.pointerType !== this.kind) return; // a hand beside its pen
     this.canvas.setPointerCapture(event.pointerId);
     this.pointers.set(event.pointerId, [event.offsetX, event.offsetY]);
-    if (this.pointers.size !== 1) return;
+    if (this.pointers.size !== 1) {
+      this.brush?.drop(this.motion); // two fingers zoom
+      return;
+    }
     if (this.brush?.name) {
       this.stroke(event.offsetX, event.offsetY);
       return;

@@ -50,7 +50,8 @@ export class HairView {
     this.solids = solids.map((name) => this.solid(name));
     this.skin = texture(gl);
     const plain = new Uint8Array(SKIN);
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA, 1, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, plain);
+    gl.texImage2D(
+      gl.TEXTURE_2D, 0, gl.SRGB8_ALPHA8, 1, 1, 0, gl.RGBA, gl.UNSIGNED_BYTE, plain);
     if (arrays.head_skin) this.showSkin(arrays.head_skin.data);
     this.middle = middleOf(arrays.head_points.data);
     this.target = middleOf(arrays.hair.data).map((value, k) => (value + this.middle[k]) / 2);

@@ -1,7 +1,8 @@
-"""What an Alembic file keeps when the attributes of grooms are left out."""
+"""What an Alembic file says of strands: left out, or in an object for each group."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,9 @@ from hairkit_plugins import alembic
 from rich_groom import rich_groom
 
 from hairkit.grooming.prepare_export import complete_groom
+from hairkit.types.strands import PLANTED
 
-pytest.importorskip("alembic3d")
+Abc = pytest.importorskip("alembic3d").Abc
 
 
 def test_attributes_can_be_left_out(tmp_path: Path) -> None:
@@ -26,3 +28,22 @@ def test_attributes_can_be_left_out(tmp_path: Path) -> None:
     np.testing.assert_array_equal(back.points, groom.strands.points)
     np.testing.assert_array_equal(back.widths, complete_groom(groom).strands.widths)
     assert back.guide is None
+
+
+def test_groups_can_be_objects(tmp_path: Path) -> None:
+    """Each group is an object of its name, and comes back whole; hair of one group is one object,
+    as it is by default."""
+    rich, path = rich_groom(), tmp_path / "groups.abc"
+    group = np.arange(len(rich.strands)) % 2 * PLANTED["brows"]
+    two = replace(rich, strands=replace(rich.strands, group=group))
+    one = replace(rich, strands=replace(rich.strands, group=0 * group))
+    for groom, names in ((two, ["brows", "hair_0"]), (one, ["strands"])):
+        alembic.export_groom(groom, path, alembic.Options(split=True))
+        top = Abc.IArchive(str(path)).getTop().getChild(0)
+        found = [top.getChild(k).getName() for k in range(top.getNumChildren())]
+        assert sorted(found) == names
+        wanted = complete_groom(groom).strands
+        wanted = wanted.select(np.argsort(-groom.strands.group, kind="stable"))  # brows first
+        back = alembic.import_groom(path, alembic.Options()).strands
+        for name in ("points", "widths", "group", "guide", "root_uv"):
+            np.testing.assert_array_equal(getattr(back, name), getattr(wanted, name))
