@@ -6,6 +6,7 @@ python benchmarks/studio.py --photos photos/ --strokes 3
 from __future__ import annotations
 
 import argparse
+import contextlib
 import http.client
 import json
 import os
@@ -74,13 +75,15 @@ class Studio:
     def busy_s(self) -> float:
         """Return the processor's seconds of the server and of the processes that it started, with
         those that have ended."""
-        tasks = Path(f"/proc/{self.process.pid}/task/{self.process.pid}/children")
-        if not tasks.is_file():
+        if not Path(f"/proc/{self.process.pid}/stat").is_file():
             return float("nan")
-        ticks = 0
-        for pid in [str(self.process.pid), *tasks.read_text().split()]:
-            fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-            ticks += sum(int(field) for field in fields[11:15])
+        ticks, pids = 0, [str(self.process.pid)]
+        for pid in pids:
+            with contextlib.suppress(FileNotFoundError, ProcessLookupError):  # it has ended
+                fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+                ticks += sum(int(field) for field in fields[11:15])
+                for task in Path(f"/proc/{pid}/task").iterdir():
+                    pids += (task / "children").read_text().split()
         return ticks / os.sysconf("SC_CLK_TCK")
 
 

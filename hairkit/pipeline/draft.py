@@ -5,12 +5,13 @@ masks; a draft reads what `hairkit.stages` says that it keeps, and looks again a
 drawn on alone, where `see_photo` has not done so already. Hull, field and strands are made anew, on
 a coarser grid where the recipe says so and from smaller pictures where the capture was read so.
 What a process has once read of a run it keeps, so that only the first of its drafts waits for the
-disk. The next full run replaces what a draft shows.
+disk, and the last result of each stage, so that a draft makes only what its change leads to. The
+next full run replaces what a draft shows.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import lru_cache
@@ -32,7 +33,7 @@ from hairkit.pipeline.recipe import Recipe
 from hairkit.pipeline.run_log import RunLog
 from hairkit.pipeline.single_photo import SeenPhoto, see_photo
 from hairkit.pipeline.stage_runner import Given, StageRunner, Views, completed
-from hairkit.pipeline.work_folder import LastRun, stage_file
+from hairkit.pipeline.work_folder import LastRun, Memory, stage_file
 from hairkit.progress import Progress, Silent
 from hairkit.stages import DRAWN, FRAMED, KEPT, LABELS, ORIENTED, PARTING, REFINED, TURN, Stage
 from hairkit.storage import Stored
@@ -46,7 +47,7 @@ from hairkit.types.turnaround import Turnaround
 
 _Result = TypeVar("_Result", bound=Stored)
 MOST_KEPT = 64
-"""Results of each kind that a process keeps: those of a turn of 36 photos, and spare ones."""
+"""Results of a stage that a process keeps: those of a turn of 36 photos, and spare ones."""
 
 
 @one_blas_thread()
@@ -58,6 +59,7 @@ def draft(
     manager: Manager,
     guides: int,
     progress: Progress | None = None,
+    anew: Collection[str] = (),
 ) -> Groom:
     """Return a groom from a capture and what a whole run left in its work folder.
 
@@ -78,6 +80,8 @@ def draft(
         Number of roots.
     progress
         Hears of each stage that is run; what it raises ends the draft.
+    anew
+        `orient` where the recipe follows strands otherwise than the last run did.
 
     Raises
     ------
@@ -85,9 +89,13 @@ def draft(
         The last run found other views, or was not ended.
     """
     with ThreadPoolExecutor(1, thread_name_prefix="hairkit") as pool:
-        # nothing is kept: the next draft is made of other masks
-        run = StageRunner(recipe, manager, None, RunLog(progress or Silent()), pool)
-        return Drafted(run, capture, work, touched, guides).groom
+        run = StageRunner(recipe, manager, _memory(work), RunLog(progress or Silent()), pool)
+        return Drafted(run, capture, work, touched, guides, anew).groom
+
+
+@lru_cache(1)
+def _memory(work: Path) -> Memory:
+    return Memory()
 
 
 class Drafted(Findings):
@@ -100,9 +108,10 @@ class Drafted(Findings):
         work: Path,
         touched: Mapping[str, Path],
         guides: int,
+        anew: Collection[str] = (),
     ) -> None:
         super().__init__(run, photos, guides=guides)
-        self._work, self._touched = work, touched
+        self._work, self._touched, self._anew = work, touched, anew
 
     def kept(self, stage: Stage[Any]) -> Given[Any] | None:
         """Return the result of the last run, if a draft keeps it and the recipe has the stage."""
@@ -110,7 +119,7 @@ class Drafted(Findings):
             return None
         # of the stages that see all views the parting alone follows what was drawn
         if stage.draft is KEPT or (stage.draft is DRAWN and not self._parting_is_new):
-            return Given(_read(stage, self._work), "")
+            return _read(stage, self._work)
         return None
 
     @property
@@ -119,13 +128,13 @@ class Drafted(Findings):
         views = [view for view in self.capture.views if self._folder(view) is not None]
         strokes = [read_view_strokes(view, view.width, view.height) for view in views]
         drawn = any(each is not None and each.labelled("parting") for each in strokes)
-        last: Parting = _read(PARTING, self._work)
+        last: Parting = _read(PARTING, self._work).value
         return drawn or self.capture.parting is not None or last.source != Parting().source
 
     @found
     def views(self) -> tuple[Capture, Turnaround | None]:
         """The views in the order of the turn, without faces and persons."""
-        framing, count = _read(FRAMED, self._work), len(self.photos.views)
+        framing, count = _read(FRAMED, self._work).value, len(self.photos.views)
         if len(framing.frames) != count:
             raise InputError(
                 f"{self._work}: the last run had {len(framing.frames)} photos, now {count}"
@@ -133,7 +142,7 @@ class Drafted(Findings):
         framed = frame_photos(self.photos, framing)
         if not self.run.recipe.has(TURN):
             return framed, None
-        turn = _read(TURN, self._work)
+        turn = _read(TURN, self._work).value
         return framed.arranged(turn), turn
 
     @found
@@ -148,12 +157,14 @@ class Drafted(Findings):
     @found
     def view_masks(self) -> Views[Mask]:
         """Masks of the last run, found again where a photo was touched."""
-        return [completed(Given(self._mask(k), "")) for k in range(len(self.capture.views))]
+        return [completed(self._mask(k)) for k in range(len(self.capture.views))]
 
     @found
     def view_orientations(self) -> Views[OrientationMap]:
-        """Directions of the last run, found again where a photo was touched."""
-        return [completed(Given(self._angles(view), "")) for view in self.capture.views]
+        """Directions of the last run, found again where a photo was touched, or in all of them."""
+        if ORIENTED.name in self._anew:
+            return super().view_orientations
+        return [completed(self._angles(view)) for view in self.capture.views]
 
     def _folder(self, view: View) -> Path | None:
         """Return where what is found in a photo that was touched is kept; None for other photos."""
@@ -170,26 +181,29 @@ class Drafted(Findings):
             if (folder := folders[view.name]) is not None
         }
 
-    def _mask(self, index: int) -> Mask:
+    def _mask(self, index: int) -> Given[Mask]:
         view = self.capture.views[index]
         if view.name in self._seen:
-            return self._seen[view.name].mask
-        size, last = (view.width, view.height), LastRun(self._work)
-        if view.mask_path is None and last.has(REFINED):
-            return _small_refined(_time(REFINED, self._work), self._work, index, size)
-        return _small_mask(_time(LABELS, self._work, view.name), self._work, view.name, size)
+            return Given.of(self._seen[view.name].mask)
+        if view.mask_path is None and LastRun(self._work).has(REFINED):
+            return self._small(REFINED, view, index)
+        return self._small(LABELS, view)
 
-    def _angles(self, view: View) -> OrientationMap:
+    def _angles(self, view: View) -> Given[OrientationMap]:
         if view.name in self._seen:
-            return cast(OrientationMap, self._seen[view.name].orientation)
-        time = _time(ORIENTED, self._work, view.name)
-        return _small_orientation(time, self._work, view.name, (view.width, view.height))
+            return Given.of(cast(OrientationMap, self._seen[view.name].orientation))
+        return self._small(ORIENTED, view)
+
+    def _small(self, stage: Stage[Any], view: View, index: int = 0) -> Given[Any]:
+        """Return what a stage of the last run found in a photo, at the view's size."""
+        key = stage, self._work, view.name if stage.each else ""
+        return _small_once(_time(*key), *key, index, (view.width, view.height))
 
 
-def _read(stage: Stage[_Result], work: Path, view: str = "") -> _Result:
+def _read(stage: Stage[_Result], work: Path, view: str = "") -> Given[_Result]:
     """Return what a stage of the last run made; read once."""
     read: Any = _read_once  # of every kind
-    return cast(_Result, read(_time(stage, work, view), stage, work, view))
+    return cast(Given[_Result], read(_time(stage, work, view), stage, work, view))
 
 
 def _time(stage: Stage[Any], work: Path, view: str = "") -> int:
@@ -199,29 +213,21 @@ def _time(stage: Stage[Any], work: Path, view: str = "") -> int:
 
 
 @lru_cache(MOST_KEPT)
-def _read_once(time: int, stage: Stage[Any], work: Path, view: str) -> Any:
-    return LastRun(work).latest(stage, view)
+def _read_once(time: int, stage: Stage[Any], work: Path, view: str) -> Given[Any]:
+    return Given.of(LastRun(work).latest(stage, view))
 
 
-@lru_cache(MOST_KEPT)
-def _small_refined(time: int, work: Path, index: int, size: tuple[int, int]) -> Mask:
-    return _small(_read(REFINED, work).views[index], size)
-
-
-@lru_cache(MOST_KEPT)
-def _small_mask(time: int, work: Path, view: str, size: tuple[int, int]) -> Mask:
-    return _small(LastRun(work).latest(LABELS, view), size)
-
-
-def _small(mask: Mask, size: tuple[int, int]) -> Mask:
+@lru_cache(2 * MOST_KEPT)
+def _small_once(
+    time: int, stage: Stage[Any], work: Path, view: str, index: int, size: tuple[int, int]
+) -> Given[Any]:
+    found: Any = LastRun(work).latest(stage, view) if stage.each else _read(stage, work).value
+    if stage is ORIENTED:
+        angle, confidence = (_every_few(part, size) for part in (found.angle, found.confidence))
+        return Given.of(OrientationMap(angle, confidence))
+    mask = found if stage.each else found.views[index]
     alpha = None if mask.alpha is None else np.asarray(cv2.resize(mask.alpha, size), np.uint8)
-    return Mask(_every_few(mask.labels, size), mask.person_known, alpha)
-
-
-@lru_cache(MOST_KEPT)
-def _small_orientation(time: int, work: Path, view: str, size: tuple[int, int]) -> OrientationMap:
-    found = LastRun(work).latest(ORIENTED, view)
-    return OrientationMap(_every_few(found.angle, size), _every_few(found.confidence, size))
+    return Given.of(Mask(_every_few(mask.labels, size), mask.person_known, alpha))
 
 
 def _every_few(picture: npt.NDArray[Any], size: tuple[int, int]) -> Any:

@@ -21,7 +21,7 @@ from hairkit.memory import give_back_memory
 from hairkit.pipeline.module_digest import module_digest
 from hairkit.pipeline.recipe import Choice, Recipe, stage_digest
 from hairkit.pipeline.run_log import RunLog
-from hairkit.pipeline.work_folder import WorkFolder, digest_of
+from hairkit.pipeline.work_folder import Results, digest_of
 from hairkit.stages import EXPORT, Stage
 from hairkit.storage import Stored, from_arrays, to_arrays
 from hairkit.types.capture import View
@@ -68,7 +68,7 @@ class StageRunner:
     """
 
     def __init__(
-        self, recipe: Recipe, manager: Manager, work: WorkFolder | None, log: RunLog, pool: Executor
+        self, recipe: Recipe, manager: Manager, work: Results | None, log: RunLog, pool: Executor
     ) -> None:
         self.recipe = recipe
         self.manager = manager

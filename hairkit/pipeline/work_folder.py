@@ -176,6 +176,25 @@ class WorkFolder:
             path.unlink()
 
 
+class Memory:
+    """The last result of each stage in this process: what a run finds again of the run before."""
+
+    def __init__(self) -> None:
+        self._results: dict[tuple[str, str], tuple[str, Any]] = {}
+
+    def get(self, stage: Stage[_Result], digest: str, view: str = "") -> _Result | None:
+        """Return the result with this digest, None if it is another one."""
+        kept, result = self._results.get((stage.name, view), ("", None))
+        return result if kept == digest else None
+
+    def put(self, stage: Stage[_Result], value: _Result, digest: str, view: str = "") -> None:
+        """Keep a stage's result in the place of the one before."""
+        self._results[stage.name, view] = digest, value
+
+
+Results = WorkFolder | Memory
+
+
 def drop_work(out: str | os.PathLike[str]) -> None:
     """Remove what the stages of a run kept: groom, exports and record stay, and can be rerun."""
     with WorkFolder(Path(out) / WORK) as work:

@@ -21,13 +21,14 @@ from hairkit.grooming.brushes import BRUSHES
 from hairkit.io.capture_reader import EDITS
 from hairkit.io.capture_toml import HeadEntry
 from hairkit.options import make_options, option
+from hairkit.stages import ORIENTED
 from hairkit.storage import read_bytes
 from hairkit.studio.feedback import for_pages
 from hairkit.studio.guard import SESSION_PATH, Sessions
 from hairkit.studio.lan import qr_svg
 from hairkit.studio.project import Shot
 from hairkit.studio.result_page import result_page
-from hairkit.studio.studio import BUILD_S, EXPORT_S, PHOTO_S, Studio
+from hairkit.studio.studio import BUILD_S, CHOICES, EXPORT_S, PHOTO_S, Studio
 from hairkit.studio.uploads import receive_file, receive_json
 from hairkit.types.chosen import ChosenHair
 from hairkit.types.edits import GROUPS, Edits
@@ -243,7 +244,7 @@ class Routes:
 
     async def _place_head(self, request: Request) -> Response:
         entry = make_options(HeadEntry, await receive_json(request), "head")
-        return await self._change(partial(self._studio.project.place_head, entry), [])
+        return await self._change(partial(self._studio.project.place_head, entry), [CHOICES])
 
     async def _pose(self, request: Request) -> Response:
         return JSONResponse(await self._studio.editor.call("pose", PHOTO_S, self._placed()))
@@ -256,7 +257,7 @@ class Routes:
             found = await self._studio.editor.call("pose", PHOTO_S, values)
             entry = make_options(HeadEntry, found.pop("entry"), "head")
             self._studio.project.place_head(entry)
-        self._studio.changed(touched=[])
+        self._studio.changed(touched=[CHOICES])
         return JSONResponse(found)
 
     def _placed(self) -> dict[str, Any]:
@@ -314,8 +315,12 @@ class Routes:
             raise HTTPException(HTTPStatus.BAD_REQUEST, "expected options and hair")
         found = await self._studio.editor.call("check", PHOTO_S, values)
         hair = make_options(ChosenHair, found["hair"], "hair")
-        choose = self._studio.project.choose
-        return await self._change(partial(choose, found["plugin"], found["options"], hair))
+        studio, before = self._studio, self._studio.project.chosen.settings
+        async with studio.change:
+            studio.project.choose(found["plugin"], found["options"], hair)
+        followed = studio.project.chosen.settings != before
+        studio.changed(touched=[CHOICES, *([ORIENTED.name] if followed else [])])
+        return JSONResponse({})
 
     async def _build(self, request: Request) -> Response:
         if not self._studio.project.enough:

@@ -22,9 +22,10 @@ from hairkit.studio.project import Project, Shot
 from hairkit.studio.task_process import TaskError, TaskProcess
 from hairkit.version import __version__
 
+CHOICES = "capture.toml"
+"""The file of what was chosen."""
 QUIET_S = 0.6
-"""Seconds without a change before the hair is made again; the strands of a photo that was drawn on
-are found meanwhile."""
+"""Seconds without a change before the whole hair is made again; a preview is made at once."""
 DRAFT_GUIDES = 300
 """Roots of the quick groom that is shown until the whole one is made."""
 MEANWHILE = 6
@@ -55,7 +56,7 @@ class Studio:
         self._asked = False
         self._warm = False
         self._touched: set[str] | None = None
-        """Photos that were drawn on since the last whole run; None when more than that changed."""
+        """What changed since the last whole run, as of `changed`."""
         self._tasks: list[asyncio.Task[None]] = []
         self._shares: dict[str, tuple[int, int]] = {}
 
@@ -82,8 +83,8 @@ class Studio:
     def changed(self, ask: bool = False, touched: Collection[str] | None = None) -> None:
         """Say that the project changed, or that somebody asks for the hair.
 
-        `touched` are the files of photos whose strokes are all that changed, none where the head
-        was moved; None for any other change.
+        `touched` are the files that changed, where previews follow that: photos that were drawn on,
+        `EDITS`, `CHOICES`; and stages to be run otherwise. None is any other change.
         """
         if ask:
             self.held = False
@@ -256,6 +257,8 @@ class Studio:
         while True:
             await self._wanted.wait()
             self._wanted.clear()
+            if self._touched is not None and self._due() and self.project.groom.is_file():
+                await self._draft(sorted(self._touched))
             with contextlib.suppress(TimeoutError):
                 await asyncio.wait_for(self._wanted.wait(), QUIET_S)
                 continue  # it changed again
@@ -265,10 +268,7 @@ class Studio:
                     self._tell()
                 self._set_build(**self._standing())
                 continue
-            if self._touched is not None and self.project.groom.is_file():
-                await self._draft(sorted(self._touched))
-            if not self._wanted.is_set():
-                await self._while_unchanged(asyncio.create_task(self._build()))
+            await self._while_unchanged(asyncio.create_task(self._build()))
             if self.build["state"] == "done" and not self._warm:
                 self.builder, self.drafter = self.drafter, self.builder  # its kernels are loaded
                 self._warm = True
@@ -286,6 +286,9 @@ class Studio:
     async def _draft(self, touched: list[str]) -> None:
         """Make a quick groom of what a hand changed, unless the next change comes before."""
         self._set_build(state="running", share=0.0, words="a quick preview")
+        await self.editor.idle()  # masks that are being found are not looked for twice
+        if self._wanted.is_set():
+            return
         change = asyncio.create_task(self._stop_on_change())
         try:
             done = await self._call_drafter(touched, self.project.draft)
@@ -315,6 +318,7 @@ class Studio:
             },
             "guides": min(DRAFT_GUIDES, self.guides),
         }
+        values["anew"] = [name for name in touched if name in OF_NAME]
         task = "edit" if touched == [EDITS] else "draft"
         return await self.drafter.call(task, BUILD_S, values)
 

@@ -78,6 +78,11 @@ class TaskProcess:
                     return answer["result"]["made"]
             raise TaskError("the process for it ended again and again; a file may be damaged")
 
+    async def idle(self) -> None:
+        """Wait until the tasks that were asked for before have ended."""
+        async with self._turn:
+            pass
+
     def stop(self) -> None:
         """Ask the task that is running to end early, as if it had failed."""
         self._stop.touch()

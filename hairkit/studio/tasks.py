@@ -137,7 +137,7 @@ def build_groom(request: dict[str, Any], tell: Tell) -> Any:
 def draft_groom(request: dict[str, Any], tell: Tell) -> Any:
     """Write the `packet` of a quick groom after strokes on the photos `touched`.
 
-    These are their names, each with the folder in which what is found in it is kept.
+    These are their names, each with the folder of what is found in it; `anew` is as of `draft`.
     """
 
     capture, coarse = take_with_choices(
@@ -146,7 +146,8 @@ def draft_groom(request: dict[str, Any], tell: Tell) -> Any:
     work = Path(request["folder"]) / "result" / "work"
     drawn = {name: Path(folder) for name, folder in request["touched"].items()}
     told = _Told(tell, Path(request["stop"]))
-    groom = draft(capture, work, drawn, coarse, manager(), request["guides"], told)
+    guides, anew = request["guides"], request["anew"]
+    groom = draft(capture, work, drawn, coarse, manager(), guides, told, anew=anew)
     _hair_packet(groom, request)
     return {}
 

@@ -22,6 +22,7 @@ from hairkit.pipeline.reconstruct import reconstruct
 from hairkit.progress import Silent
 from hairkit.stages import NEW, ROWS
 from hairkit.testing import ball_head, turn_capture, turn_scene
+from hairkit.types.chosen import Chosen, ChosenHair
 
 BALL = parse_recipe(RECIPE.encode(), "ball", "test")
 
@@ -57,11 +58,40 @@ def test_a_draft_follows_a_change_without_the_cameras(tmp_path: Path, manager: M
     assert calls == ["segment back-left", "orient back-left", "hull", "field", "track"]
     ball_plugin.CALLS.clear()
     draft(capture, tmp_path / "work", drawn, BALL, manager, 30)
-    assert ball_plugin.CALLS == ["hull", "field", "track"]  # its strands were found before
+    assert ball_plugin.CALLS == []  # nothing changed since
     assert len(quick.strands) == 30
     assert quick.head.vertices.shape == ball_head().vertices.shape
     with pytest.raises(InputError, match="run all stages first"):
         draft(capture, tmp_path / "nothing", {}, BALL, manager, 30)
+
+
+def test_a_draft_makes_again_what_follows_from_a_change(tmp_path: Path, manager: Manager) -> None:
+    """After one draft the next one runs the stages that its change leads to, and no other."""
+    capture, work = turn_capture(), tmp_path / "work"
+    first = draft(capture, work, {}, BALL, manager, 30)
+    calls: dict[str, list[str]] = {}
+    wider = replace(capture, chosen=Chosen(hair=ChosenHair(width_mm=0.3)))
+    pose = np.eye(4)
+    pose[1, 3] = 0.002
+    moved = replace(capture, chosen=Chosen(head=pose))
+    changes: dict[str, tuple[Capture, int, tuple[str, ...]]] = {
+        "look": (wider, 30, ()),
+        "roots": (wider, 20, ()),
+        "head": (moved, 20, ()),
+        "options": (moved, 20, ("orient",)),
+    }
+    for name, (changed, guides, anew) in changes.items():
+        ball_plugin.CALLS.clear()
+        quick = draft(changed, work, {}, BALL, manager, guides, anew=anew)
+        calls[name] = sorted({call.split()[0] for call in ball_plugin.CALLS})
+        assert len(quick.strands) == guides
+    assert "hull" not in calls["look"]
+    assert calls["roots"] == ["track"]
+    assert calls["head"] == ["field", "hull", "track"]
+    assert "orient" in calls["options"]
+    assert "hull" not in calls["options"]
+    again = draft(capture, work, {}, BALL, manager, 30)
+    assert np.array_equal(again.strands.points, first.strands.points)
 
 
 def test_a_draft_reads_what_the_table_of_stages_says(tmp_path: Path, manager: Manager) -> None:

@@ -11,8 +11,10 @@ from typing import Any
 import pytest
 from waiting import run
 
+from hairkit.stages import ORIENTED
 from hairkit.studio.project import Project
-from hairkit.studio.studio import Studio
+from hairkit.studio.studio import CHOICES, Studio
+from hairkit.types.chosen import ChosenHair
 
 LINE = {"label": "background", "shape_type": "linestrip", "points": [[1, 1], [9, 9]]}
 LONGEST_S = 20.0
@@ -28,8 +30,10 @@ class Process:
 
     async def call(self, do: str, limit_s: float, values: Any = None, tell: Any = None) -> Any:
         """Answer as an empty task would."""
-        if do == "build" or (do == "draft" and values["touched"]):  # not the first, unseen one
-            self.calls.append((do, list(values["touched"]) if do == "draft" else None))
+        if do == "build":
+            self.calls.append((do, None))
+        elif do == "draft" and "unseen" not in values["packet"]:
+            self.calls.append((do, [*values["touched"], *values["anew"]]))
         if do in ("outline", "follow", "prepare"):
             self.looks.append((do, Path(values["photo"]).name))
         if do == "build":
@@ -42,6 +46,9 @@ class Process:
         if do == "draft":
             Path(values["packet"]).write_bytes(b"packet")
         return {"formats": [["native", ".npz"]], "outline": [], "share": 0.5}
+
+    async def idle(self) -> None:
+        """Do nothing: no task takes long."""
 
     def stop(self) -> None:
         """End nothing."""
@@ -101,9 +108,28 @@ def test_a_stroke_is_previewed_before_the_whole_hair_is_made(studio: Studio) -> 
     run(story)
 
 
+def test_a_choice_is_previewed(studio: Studio) -> None:
+    """Another look and a moved head need no photo again; other options need what they are of."""
+    calls = studio.builder.calls  # type: ignore[attr-defined]
+    chosen = ChosenHair(width_mm=0.2)
+
+    async def story() -> None:
+        await studio.start()
+        await until(lambda: studio.build["state"] == "done")
+        for options, anew in (({}, []), ({"finest_window": 2.5}, [ORIENTED.name])):
+            calls.clear()
+            studio.project.choose("structure_tensor", options, chosen)
+            studio.changed(touched=[CHOICES, *anew])
+            await until(lambda: len(calls) == 2 and studio.build["state"] == "done")
+            assert calls == [("draft", anew), ("build", None)]
+        await studio.close()
+
+    run(story)
+
+
 def test_a_photos_strands_are_found_as_soon_as_its_mask_stands(studio: Studio) -> None:
-    """Before any hair is made; a stroke or a tone restarts the photo that it is on, and no other,
-    and that before the preview which needs it begins."""
+    """Before any hair is made; a stroke or a tone restarts the photo that it is on, and no
+    other."""
     looks, calls = studio.editor.looks, studio.builder.calls  # type: ignore[attr-defined]
     files = [shot.file for shot in studio.project.shots]
     studio.held = True
@@ -120,8 +146,8 @@ def test_a_photos_strands_are_found_as_soon_as_its_mask_stands(studio: Studio) -
         stroke(studio, 3, 20)
         await studio.outline(studio.project.shot(3))
         await until(lambda: ("draft", [files[2]]) in calls)
+        await until(lambda: studio.build["state"] == "done" and len(looks) > 1)
         assert looks == [("outline", files[2]), ("follow", files[2])]
-        await until(lambda: studio.build["state"] == "done")
         await studio.close()
 
     run(story)

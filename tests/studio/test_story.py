@@ -231,6 +231,24 @@ def test_the_hair_moves(page: Any, story: Any) -> None:
     assert settled < 2e-3
 
 
+def test_hair_at_rest_is_drawn_once(page: Any, story: Any) -> None:
+    """Hair that hangs still is drawn by all strands and then no more, until the view turns."""
+    go(page, story, "hair")
+    page.locator("#hair[data-skin]").wait_for()
+    view = "document.querySelector('#hair').hairView"
+    page.wait_for_function(f"() => {view}.drawn === 1")
+    page.evaluate(f"""() => {{
+      const draw = {view}.drawHair;
+      window.pictures = 0;
+      {view}.drawHair = function (...all) {{ window.pictures += 1; draw.apply(this, all); }};
+    }}""")
+    frames = int(page.locator("#hair").get_attribute("data-frames"))
+    page.wait_for_function(f"() => document.querySelector('#hair').dataset.frames > {frames + 5}")
+    assert page.evaluate("window.pictures") == 0
+    page.evaluate(f"{view}.azimuth += 0.3")
+    page.wait_for_function(f"() => window.pictures > 1 && {view}.drawn === 1")
+
+
 def test_hair_that_comes_late_is_not_drawn_over_another_page(page: Any, story: Any) -> None:
     """Who leaves the page of the hair before it is read sees what was asked for instead."""
     held: list[Any] = []

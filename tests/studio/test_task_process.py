@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import sys
 from pathlib import Path
 
@@ -45,6 +46,22 @@ def test_a_task_whose_process_is_killed_is_done_by_another(
         return done
 
     assert run(ask) == kills + 1
+
+
+def test_idle_comes_after_what_was_asked_for_before(process: TaskProcess, tmp_path: Path) -> None:
+    """Whoever waits for it finds what the tasks before left."""
+    path = tmp_path / "count"
+
+    async def ask() -> bool:
+        done = asyncio.create_task(process.call("count", 20.0, {"kills": 1, "path": str(path)}))
+        await asyncio.sleep(0)
+        await process.idle()
+        ended = path.read_text() == "xx"
+        await done
+        process.close()
+        return ended
+
+    assert run(ask)
 
 
 def test_a_task_that_ends_every_process_is_given_up(process: TaskProcess, tmp_path: Path) -> None:

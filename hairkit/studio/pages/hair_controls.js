@@ -41,8 +41,8 @@ class HairControls {
   }
 
   close() {
-    const { azimuth, elevation, distance } = this.view;
-    Object.assign(this.seen, { azimuth, elevation, distance });
+    const { azimuth, elevation, distance, share } = this.view;
+    Object.assign(this.seen, { azimuth, elevation, distance, share });
     this.ended = true;
     this.view.close();
   }

@@ -7,6 +7,10 @@ import {
 const COLUMNS = 128; // strands in a row of the texture: 16 points each make 2048 texels
 const SKIN = [172, 134, 115, 255]; // until the picture of the skin is decoded
 const LEAST_PX = 0.6; // width of a strand, of which samples of a pixel show part
+const STILL_M = 1e-4; // a guide that moves by less is not drawn anew
+// Moving hair of which a picture takes longer is drawn by half of its strands, wider ones; by twice
+// as many where it takes less; by all once nothing has moved for a while.
+const SLOW_MS = 100, QUICK_MS = 35, LEAST_SHARE = 1 / 16, FIRST_SHARE = 1 / 4, REST_MS = 300;
 const NEAR = 0.05, FAR = 10, VIEW_ANGLE = 0.5; // metres, metres, radians
 
 export function readPacket(buffer) {
@@ -43,6 +47,10 @@ export class HairView {
     const width = this.points * COLUMNS, height = Math.ceil(this.hairs / COLUMNS);
     upload(gl, this.hair, width, height, fourWide(arrays.hair.data, width * height));
     this.shift = new Float32Array(4 * this.points * arrays.guides.shape[0]);
+    this.shown = null; // size and camera of the picture; null where it is to be drawn
+    this.share = FIRST_SHARE; // of the strands, that moving hair is drawn by
+    this.drawn = 0; // the share in the picture
+    [this.asked, this.stirred] = [-Infinity, -Infinity]; // times of the last draw and motion
     this.hairArray = vertexArray(gl, this.hairProgram, {
       a_carriers: [arrays.carriers.data, 3, 1], a_weights: [arrays.weights.data, 3, 1],
     });
@@ -88,6 +96,7 @@ export class HairView {
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.LINEAR);
     this.canvas.parentElement.dataset.skin = `${picture.width} x ${picture.height}`;
+    this.shown = null;
   }
 
   camera() {
@@ -113,6 +122,7 @@ export class HairView {
     return { matrix, eye, right, up, back };
   }
 
+  // Draws the picture unless it is as it was: without a graphics card that takes all cores.
   draw(motion) {
     const { gl, canvas } = this;
     const sharp = Math.min(devicePixelRatio || 1, 2);
@@ -121,6 +131,9 @@ export class HairView {
     if (canvas.width !== width) canvas.width = width;
     if (canvas.height !== height) canvas.height = height;
     const { matrix, eye } = this.camera();
+    const shown = [width, height, ...matrix].join();
+    if (!this.due(shown !== this.shown || this.moves(motion), performance.now())) return;
+    this.shown = shown;
     const { look } = this.packet.facts;
     const seen = { u_clip_from_head: matrix, u_eye: eye };
     gl.viewport(0, 0, width, height);
@@ -132,7 +145,7 @@ export class HairView {
     gl.enable(gl.DEPTH_TEST);
     this.drawSolids({ ...seen, u_key: look.u_key_direction });
     this.uploadMotion(motion);
-    this.drawHair({ ...seen, ...look }, height);
+    this.drawHair({ ...seen, ...look, u_width: look.u_width / Math.sqrt(this.drawn) }, height);
   }
 
   drawSolids(seen) {
@@ -143,6 +156,33 @@ export class HairView {
       gl.bindVertexArray(array);
       gl.drawElements(gl.TRIANGLES, corners, gl.UNSIGNED_INT, 0);
     }
+  }
+
+  // Returns whether a picture is to be drawn, and sets the share of the strands in it.
+  due(moving, now) {
+    const taken = now - this.asked, before = this.stirred === this.asked;
+    this.asked = now;
+    if (moving) {
+      if (before && taken > SLOW_MS) this.share = Math.max(this.share / 2, LEAST_SHARE);
+      else if (before && taken < QUICK_MS) this.share = Math.min(2 * this.share, 1);
+      this.stirred = now;
+      this.drawn = this.share;
+      return true;
+    }
+    if (this.drawn === 1 || now - this.stirred < REST_MS) return false;
+    this.drawn = 1;
+    return true;
+  }
+
+  // Returns whether a guide is elsewhere than in the picture, or of another colour.
+  moves({ now, captured, tints }) {
+    const { shift } = this, bits = new Uint32Array(shift.buffer);
+    for (let i = 0, j = 0; i < now.length; i += 3, j += 4) {
+      if (bits[j + 3] !== tints[i / 3]) return true;
+      for (let k = 0; k < 3; k += 1)
+        if (Math.abs(shift[j + k] + captured[i + k] - now[i + k]) > STILL_M) return true;
+    }
+    return false;
   }
 
   // Sends how far every point of the guides has moved, and its colour.
@@ -165,7 +205,8 @@ export class HairView {
       u_pixel: (LEAST_PX * 2 * Math.tan(VIEW_ANGLE / 2)) / Math.max(height, 1),
     });
     gl.bindVertexArray(this.hairArray);
-    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 2 * this.points, this.hairs);
+    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 2 * this.points,
+      Math.ceil(this.drawn * this.hairs));
   }
 
   // Binds textures to a program's samplers.
