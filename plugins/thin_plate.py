@@ -17,7 +17,6 @@ from scipy.ndimage import map_coordinates
 
 from hairkit import Camera, Capture, Head, Mask, Scene, hookimpl
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
-from hairkit.cameras.landmark_equations import landmark_noise
 from hairkit.cameras.outlines import Outlines
 from hairkit.cameras.similarity import triangulate
 from hairkit.head_model.cranium import LEAST_SHARE, RIM, Cranium
@@ -85,8 +84,7 @@ def _bend_to_landmarks(capture: Capture, scene: Scene, options: Options) -> Head
         return head
     pixels = np.stack([view.landmarks for view in capture.views if view.landmarks is not None])
     cameras = [camera for camera, has in zip(scene.cameras, seen, strict=True) if has]
-    noise = np.stack([landmark_noise(v) for v in capture.views if v.landmarks is not None])
-    points = triangulate(cameras, pixels, noise**-2)
+    points = triangulate(cameras, pixels)
     source = head.vertices[head.landmark_vertices].astype(np.float64)
     # scalp behind the ears' plane, of which the landmarks know nothing
     behind = head.vertices[:, 2] < np.median(head.vertices[:, 2])

@@ -8,6 +8,7 @@ prior), so that only the cameras remain unknown.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +17,7 @@ from scipy.sparse import csr_matrix
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
 from hairkit.head_model.cranium import Cranium
 from hairkit.types.capture import Capture, View
+from hairkit.types.face import STEEP_YAW_DEG
 from hairkit.types.head import JAW_LANDMARKS, LANDMARKS
 from hairkit.types.mask import HAIR, Mask
 
@@ -23,6 +25,8 @@ JAW_NOISE, COVERED_NOISE = 2.0, 3.0
 """Times the noise of given landmarks of the jaw, and of those under hair: detectors guess them."""
 FACES = 4
 """Views that show the face in a turn of eight, at most."""
+CROWD_STEEP_DEG, CROWD_STEEP_NOISE = 43.0, 3.0
+"""Yaw from which more faces than that are not needed, and times whose noise they then have."""
 MIDLINE = np.array([27, 28, 29, 30, 33, 51, 57, 8])
 """Nose, lips and chin: they lie on the outline of a view from the side."""
 AFFINE_SPREAD, SMOOTH_SPREAD, SMOOTH_LENGTH = 0.004, 0.004, 0.04
@@ -38,14 +42,11 @@ above let it vary by 3.6 %. Cameras pull it, too, all one way: with 0.02 the sca
 0.93 to 0.99, with 0.012 it is 0.95 to 1.00."""
 
 
-def landmark_noise(view: View, usual: float = 1.0) -> Float64Array:
-    """Return the standard deviation (68,) of a view's landmarks, pixels.
-
-    `usual` is that of points that are not on the jaw, where the detector tells none.
-    """
-    if view.face is not None and view.face.noise_px.all():
-        return view.face.noise_px
-    return np.where(np.arange(LANDMARKS) < JAW_LANDMARKS, JAW_NOISE, 1.0) * usual
+def steep_faces(views: Sequence[View]) -> list[bool]:
+    """Return which views show a face that is turned too far; fewer where few show one."""
+    few = sum(view.landmarks is not None for view in views) <= FACES
+    most = STEEP_YAW_DEG if few else CROWD_STEEP_DEG
+    return [view.face is not None and abs(view.face.yaw_deg) > most for view in views]
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,14 +73,18 @@ class Sights:
         shown = sum(view.landmarks is not None for view in capture.views)
         usual = np.broadcast_to(noise, len(masks))
         crowded = np.sqrt(max(1.0, shown / FACES))
+        spare = CROWD_STEEP_NOISE if shown > FACES else 1.0
+        steep = steep_faces(capture.views)
         for index, (view, mask) in enumerate(zip(capture.views, masks, strict=True)):
             if view.landmarks is None:
                 continue
-            own = landmark_noise(view, usual[index])
+            own = np.where(np.arange(LANDMARKS) < JAW_LANDMARKS, JAW_NOISE, 1.0) * usual[index]
+            if view.face is not None and view.face.noise_px.all():
+                own = view.face.noise_px
             for point, (x, y) in enumerate(view.landmarks):
                 inside = 0 <= x < view.width and 0 <= y < view.height
                 covered = inside and mask.labels[int(y), int(x)] == HAIR
-                trust = COVERED_NOISE if covered else 1.0
+                trust = (COVERED_NOISE if covered else 1.0) * (spare if steep[index] else 1.0)
                 rows.append((index, point, x, y, own[point] * trust * crowded))
         return cls.of_rows(rows)
 

@@ -57,11 +57,6 @@ class Face(Stored):
         """
         return self.presence >= SURE_PRESENCE and abs(self.yaw_deg) <= SURE_YAW_DEG
 
-    @property
-    def steep(self) -> bool:
-        """True for faces turned so far that their landmarks are off."""
-        return abs(self.yaw_deg) > STEEP_YAW_DEG
-
     @classmethod
     def absent(cls) -> Self:
         """Return what stands for a photo without a face."""

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from turntable import Turntable, turntable
 
-from hairkit import Mask, View
+from hairkit import Capture, Mask, View
 from hairkit.arrays import Float64Array
 from hairkit.cameras.landmark_equations import (
     LandmarkFit,
     Sights,
-    landmark_noise,
     shape_precision,
+    steep_faces,
 )
 from hairkit.cameras.outlines import Outlines
 from hairkit.cameras.turntable import Turn
@@ -58,13 +58,30 @@ def test_landmarks_under_hair_and_of_the_jaw_count_less(bust: Turntable) -> None
     assert set(sights.noise / open_air.noise) <= {1.0, 3.0}
 
 
-def test_a_face_tells_how_far_to_trust_its_landmarks() -> None:
-    """The noise that a detector tells takes the place of the usual one."""
-    points, told = np.full((68, 2), 5.0), np.linspace(1, 4, 68)
-    plain = View("front", 0.0, np.zeros((9, 9, 3), np.uint8))
-    seen = plain.with_findings(Face(1.0, points, told, 0.0, 0.0, 0.0), Person.absent())
-    assert np.array_equal(landmark_noise(seen, 2.0), told)
-    assert np.array_equal(np.unique(landmark_noise(plain, 2.0)), [2.0, 4.0])
+def test_steep_faces_count_less_where_many_are_seen() -> None:
+    """Of more than four faces those turned by 44 degrees or more are not relied on."""
+    yaws = (-46.0, -20.0, 0.0, 20.0, 44.0)
+    points, unknown = np.full((68, 2), 5.0), np.zeros(68)
+    views = tuple(
+        View(str(yaw), yaw, np.zeros((9, 9, 3), np.uint8)).with_findings(
+            Face(1.0, points, unknown, yaw, 0.0, 0.0), Person.absent()
+        )
+        for yaw in yaws
+    )
+    masks = (Mask(np.where(np.eye(9) > 0, 128, 255).astype(np.uint8), True),) * 5
+    noise = Sights.of(Capture(views), masks, 1.0).noise.reshape(5, 68)
+    assert np.allclose(noise[[0, 4]], 3 * noise[1:3])
+    few = Sights.of(Capture(views[:4]), masks[:4], 1.0).noise.reshape(4, 68)
+    assert np.array_equal(few[0], few[1])
+    assert steep_faces(views) == [True, False, False, False, True]
+    assert steep_faces(views[:4]) == [False] * 4
+
+
+def test_few_faces_are_steep_from_a_larger_yaw() -> None:
+    """What little they tell is needed, until their landmarks are off by 5 mm."""
+    face = Face(1.0, np.full((68, 2), 5.0), np.ones(68), 48.0, 0.0, 0.0)
+    view = View("front-left", 45.0, np.zeros((9, 9, 3), np.uint8))
+    assert steep_faces([view.with_findings(face, Person.absent())]) == [True]
 
 
 def test_the_pull_of_the_true_cameras_is_weak(bust: Turntable, fit: LandmarkFit) -> None:
