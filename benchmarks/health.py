@@ -28,7 +28,7 @@ from hairkit.pipeline.reconstruct import reconstruct
 from hairkit.pipeline.run_record import RECORD, read_record
 from hairkit.pipeline.work_folder import WORK, LastRun
 from hairkit.progress import Silent
-from hairkit.stages import FRAMED, TURN
+from hairkit.stages import FRAMED, TURN, WAVES
 from hairkit.types.groom import Groom
 
 GUIDES = 600
@@ -112,7 +112,7 @@ class Bench:
         masks = last.masks(scene.names)
         assert masks is not None
         shown = [PhotoHair.of(v.image, mask) for v, mask in zip(capture.views, masks, strict=True)]
-        drawn = assess_drawing(shown, scene, groom)
+        drawn = assess_drawing(shown, scene, groom, last.latest(WAVES).slant)
         old = read_record(out / RECORD).health
         return (*(f for f in old if f.name not in DRAWN), *drawn)
 

@@ -36,7 +36,7 @@ from hairkit import (
 from hairkit.arrays import Float32Array, Float64Array, Int64Array, for_kernel
 from hairkit.field.growth_prior import hair_way, long_share
 from hairkit.field.sampling_kernels import copy_point, gradient_at, make_unit, sample_at
-from hairkit.grooming.cover_hair import find_bare_cells, lead_to_roots
+from hairkit.grooming.cover_hair import find_bare_cells, lead_to_roots, spread_seeds
 from hairkit.grooming.postprocess import FinishOptions, finish
 from hairkit.head_model.torso import Torso
 from hairkit.options import option
@@ -48,18 +48,14 @@ BLOCK = 4
 part of the field find it in the cache."""
 MIN_STRANDS = 32
 """Least number of strands worth a call on another thread."""
-DISTANCE = 3
-"""Channel of the internal distance after the three of the direction."""
-GROWTH = 4
-"""Channel of the growth potential."""
+DISTANCE, GROWTH = 3, 4
+"""Channels of internal distance and growth potential after the three of the direction."""
 MAX_LENGTH = 1.2
 """Metres of the longest strand."""
-LEFT = 1.1
-"""Internal distance at which a strand that stands out of the hair's side or top has left it: there
-the tips of true strands are at 1.00 to 1.09 (medians of nine heads), below at 1.03 to 1.85, for
-they hang below what all views agree on."""
-BELOW = -0.5
-"""Upward part of the surface's normal under which a strand stands the hair below."""
+LEFT, BELOW = 1.1, -0.5
+"""Internal distance at which a strand that stands out of the hair's side or top has left it, and
+the upward part of the surface's normal below them. Tips of true strands are at 1.00 to 1.09 there
+(medians of nine heads), below at 1.03 to 1.85: they hang below what all views agree on."""
 CENTIMETRES = 100
 """Of a metre: the unit of the internal distance where the field has none of its own."""
 
@@ -70,10 +66,7 @@ class Options(FinishOptions):
 
     step: float = option(0.001, low=1e-4, high=0.01, unit="m", doc="Length of a step (delta).")
     bound: float = option(
-        1.6,
-        low=1,
-        high=10,
-        doc="Internal distance at which a strand has left the hair, below it or along its surface.",
+        1.6, low=1, high=10, doc="Internal distance at which a strand has left the hair below."
     )
     reach: float = option(
         2.0,
@@ -157,21 +150,13 @@ def track(
     strands = grow(field, volume, roots.positions, way, options, shoulders)
     if options.cover > 0 and not tied.tails:
         bare = find_bare_cells(strands, hull, masks, scene.cameras, scene.head)
-        seeds = _spread_seeds(bare, hull, options.cover * len(strands))
+        seeds = spread_seeds(bare, hull, options.cover * len(strands))
         if len(seeds):
             back = grow(field, volume, seeds, way, options, shoulders, -1.0)
             ahead = grow(field, volume, seeds, way, options, shoulders)
             ways = (s.points.reshape(len(seeds), -1, 3) for s in (back, ahead))
             strands = lead_to_roots(strands, roots.positions, *ways)
     return finish(replace(strands, root_uv=roots.uv), waves, tied, hull, field, options)
-
-
-def _spread_seeds(bare: Float64Array, hull: Hull, strands: float) -> Float32Array:
-    """Return starts (K, 3) in bare cells (N, 3): `strands` times their share of the hair."""
-    wanted = int(np.ceil(strands * len(bare) / max(int(hull.dense.sum()), 1)))
-    chosen = np.arange(wanted) * len(bare) // max(wanted, 1)
-    jitter = np.random.RandomState(0).uniform(-0.5, 0.5, (wanted, 3))  # its stream never changes
-    return (bare[chosen] + hull.grid.spacing * jitter).astype(np.float32)
 
 
 def grow(

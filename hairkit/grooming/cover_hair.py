@@ -108,6 +108,14 @@ def _seen(
     return row, column, inside & (camera.depth(points) < surface[row, column] + BEHIND)
 
 
+def spread_seeds(bare: Float64Array, hull: Hull, strands: float) -> Float32Array:
+    """Return starts (K, 3) in bare cells (N, 3): `strands` times their share of the hair."""
+    wanted = int(np.ceil(strands * len(bare) / max(int(hull.dense.sum()), 1)))
+    chosen = np.arange(wanted) * len(bare) // max(wanted, 1)
+    jitter = np.random.RandomState(0).uniform(-0.5, 0.5, (wanted, 3))  # its stream never changes
+    return (bare[chosen] + hull.grid.spacing * jitter).astype(np.float32)
+
+
 def lead_to_roots(
     strands: Strands, roots: Float32Array, back: Float32Array, ahead: Float32Array
 ) -> Strands:

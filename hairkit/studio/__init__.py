@@ -6,6 +6,7 @@ processes of its own, and all state is in the project's folder.
 * `app`: pages, routes and guard as one server
 * `capture_guides`: where the head should be in each picture of a turn
 * `clean_photo`: photos without what their files tell of a person
+* `downloads`: files of the hair, written when they are asked for
 * `events`: what changed, sent to pages
 * `feedback`: what is said about a photo, one list for all
 * `framing`: whether the head is where the page draws it

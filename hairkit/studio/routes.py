@@ -23,12 +23,13 @@ from hairkit.io.capture_toml import HeadEntry
 from hairkit.options import make_options, option
 from hairkit.stages import ORIENTED
 from hairkit.storage import read_bytes
+from hairkit.studio.downloads import made_file
 from hairkit.studio.feedback import for_pages
 from hairkit.studio.guard import SESSION_PATH, Sessions
 from hairkit.studio.lan import qr_svg
 from hairkit.studio.project import Shot
 from hairkit.studio.result_page import result_page
-from hairkit.studio.studio import BUILD_S, CHOICES, EXPORT_S, PHOTO_S, Studio
+from hairkit.studio.studio import CHOICES, PHOTO_S, Studio
 from hairkit.studio.uploads import receive_file, receive_json
 from hairkit.types.chosen import ChosenHair
 from hairkit.types.edits import GROUPS, Edits
@@ -348,18 +349,8 @@ class Routes:
             raise HTTPException(HTTPStatus.NOT_FOUND, _UNKNOWN)
         path = studio.project.result / f"groom{suffix}"
         async with self._writing:
-            await self._make_file(format_, path)
+            path = await made_file(studio, format_, path)
         return FileResponse(path, media_type="application/octet-stream", filename=path.name)
-
-    async def _make_file(self, format_: str, path: Path) -> None:
-        groom = self._studio.project.groom
-        if path.is_file() and path.stat().st_mtime_ns >= groom.stat().st_mtime_ns:
-            return
-        with tempfile.TemporaryDirectory(dir=self._studio.project.incoming) as folder:
-            made = Path(folder) / path.name
-            values = {"groom": str(groom), "format": format_, "path": str(made)}
-            await self._studio.builder.call("export", EXPORT_S + BUILD_S, values)
-            made.replace(path)
 
     async def _made(self, request: Request, name: str) -> Response:
         path = self._studio.project.result / name

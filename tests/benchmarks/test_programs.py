@@ -53,6 +53,10 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
     "health": ({"GUIDES": 30}, ["CAPTURES", "-o", "CAPTURES/health", "--ways", "cut to 0.6"]),
     "held_out": ({"GUIDES": 60, "MEASURED": 5}, ["CAPTURES"]),
     "helices": ({"COUNT": 10}, []),
+    "latency": (
+        {"GUIDES": 30},
+        ["--photos", "CAPTURES/short/photos", "--only", "viewer", "--repeats", "1"],
+    ),
     "looks": ({"GUIDES": 60}, ["CAPTURES", "-o", "CAPTURES/looks.jpg"]),
     "masks": ({}, ["CAPTURES"]),
     "dyed_hair": ({"GUIDES": 60, "HEIGHT": 160}, ["CAPTURES"]),

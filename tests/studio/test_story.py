@@ -282,7 +282,10 @@ def test_a_strand_is_held_by_keys(page: Any, story: Any) -> None:
 
 
 def test_every_format_is_downloaded(page: Any, story: Any, tmp_path: Path) -> None:
-    """Every format comes from the page, and what hairkit reads is read."""
+    """Every format comes from the page, and what hairkit reads is read.
+
+    USD comes with the picture of the skin.
+    """
     go(page, story, "hair")
     page.locator("a[download='groom.npz']").wait_for()
     offered = page.locator("a[download]").all()
@@ -290,7 +293,12 @@ def test_every_format_is_downloaded(page: Any, story: Any, tmp_path: Path) -> No
     assert {"groom.apx", "groom.npz", "groom-unreal.zip", "result.html"} < set(names)
     for link, name in zip(offered, names, strict=True):
         path = tmp_path / name
-        download(page, link, path)
+        given = download(page, link, path)
+        assert given == name + (".zip" if name.endswith(".usdc") else "")
+        if given != name:
+            shutil.unpack_archive(path, tmp_path / "several", "zip")
+            path = tmp_path / "several" / name
+            assert path.with_suffix(".albedo.jpg").is_file()
         assert path.stat().st_size > LEAST_FILE
         if not name.endswith(WRITTEN_ONLY):
             assert main(["info", str(path)]) == 0, name
@@ -318,9 +326,10 @@ def test_the_result_moves_without_a_server(
     alone.close()
 
 
-def download(page: Any, link: Any, path: Path) -> None:
-    """Save what a link of the page downloads, which the keyboard follows."""
+def download(page: Any, link: Any, path: Path) -> str:
+    """Save what a link of the page downloads, which the keyboard follows; return its name."""
     link.focus()
     with page.expect_download(timeout=1000 * SLOW_S) as caught:
         page.keyboard.press("Enter")
     caught.value.save_as(path)
+    return str(caught.value.suggested_filename)
