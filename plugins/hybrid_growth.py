@@ -55,7 +55,8 @@ MAX_LENGTH = 1.2
 LEFT, BELOW = 1.1, -0.5
 """Internal distance at which a strand that stands out of the hair's side or top has left it, and
 the upward part of the surface's normal below them. Tips of true strands are at 1.00 to 1.09 there
-(medians of nine heads), below at 1.03 to 1.85: they hang below what all views agree on."""
+(medians of seven heads; 1.8 of an eighth), below at up to 1.85: they hang below what all views
+agree on."""
 CENTIMETRES = 100
 """Of a metre: the unit of the internal distance where the field has none of its own."""
 
