@@ -16,7 +16,12 @@ import numpy as np
 
 from hairkit.arrays import BoolArray, Float64Array, Int64Array, UInt8Array
 from hairkit.imaging.hair_features import EYES, MOUTH
-from hairkit.imaging.hair_network import find_hair, hair_probability, likely_landmarks
+from hairkit.imaging.hair_network import (
+    hair_probability,
+    likely_landmarks,
+    person_or_hair,
+    silhouette,
+)
 from hairkit.imaging.person_outline import PERSON_LEVEL, trace_outline
 from hairkit.types.capture import Capture, View
 from hairkit.types.face import SURE_PRESENCE, Face
@@ -112,7 +117,7 @@ def _region(view: View) -> Float64Array:
         return inner
     part = _around(view.person.alpha)
     if _is_small(part, view):  # a large person is no smaller with hair
-        part = _around(_person_or_hair(view))
+        part = _around(person_or_hair(view))
     within = part.clip(*inner)
     return within if _is_small(part, view) and (within[1] > within[0]).all() else inner
 
@@ -146,13 +151,6 @@ def _without_border(image: UInt8Array) -> Float64Array:
     if min(side.mean() for side in sides) < SIDE_DRAWN:
         return whole
     return np.array([[left, top], [right + 1, bottom + 1]], np.float64)
-
-
-def _person_or_hair(view: View) -> UInt8Array:
-    """Return the larger (H, W) of the probabilities of the person and of hair, of 255."""
-    assert view.person is not None  # else nobody asks
-    hair = cv2.resize(find_hair(view)[..., 0], (view.width, view.height))
-    return np.maximum(view.person.alpha, (255 * hair).astype(np.uint8))
 
 
 def find_quarter_turns(
@@ -192,15 +190,11 @@ def _covered_edges(alpha: UInt8Array) -> Float64Array:
 
 
 def _find_head(view: View) -> Head | None:
-    """Return the head by the silhouette, or by the face where they contradict each other.
-
-    Where no face shows, hair may be all that shows: then what may be hair is the person's, too.
-    """
+    """Return the head by the silhouette, or by the face where they contradict each other."""
     landmarks, head = likely_landmarks(view), None
     least = LEAST_WIDTH * max(view.width, view.height)
     if view.person is not None:
-        alpha = _person_or_hair(view) if landmarks is None else view.person.alpha
-        outline = trace_outline(alpha)
+        outline = trace_outline(silhouette(view))
         if outline is not None and outline.width_px >= least:
             head = Head(outline.middle_px, outline.top_px, outline.width_px)
     if landmarks is None:

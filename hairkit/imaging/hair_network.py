@@ -72,6 +72,22 @@ def find_hair(view: View) -> Float32Array:
     return answer
 
 
+def silhouette(view: View) -> UInt8Array:
+    """Return the probability (H, W) of the person in a view in which somebody looked, of 255.
+
+    Where no face shows, hair may be all that shows: then what may be hair is the person's, too.
+    """
+    assert view.person is not None
+    return person_or_hair(view) if likely_landmarks(view) is None else view.person.alpha
+
+
+def person_or_hair(view: View) -> UInt8Array:
+    """Return the larger (H, W) of the probabilities of the person and of hair, of 255."""
+    assert view.person is not None
+    hair = cv2.resize(find_hair(view)[..., 0], (view.width, view.height))
+    return np.maximum(view.person.alpha, (255 * hair).astype(np.uint8))
+
+
 def _look_twice(
     image: UInt8Array, person: Person | None, landmarks: Float64Array | None
 ) -> Float32Array:

@@ -28,6 +28,7 @@ import numpy as np
 from hairkit import Capture, View, hookimpl
 from hairkit.arrays import BoolArray, Float64Array, Int64Array
 from hairkit.errors import InputError
+from hairkit.imaging.hair_network import silhouette
 from hairkit.imaging.person_outline import Outline, trace_outline
 from hairkit.io.photos import focal_from_equivalent
 from hairkit.io.video import SUFFIXES
@@ -242,7 +243,7 @@ def _traced(view: View) -> Outline | None:
     """Return the outline of the person in a photo, None where nobody, or next to nothing, is."""
     if view.person is None or not view.person.alpha.size:
         return None
-    outline = trace_outline(view.person.alpha)
+    outline = trace_outline(silhouette(view))
     return outline if outline and outline.width_px > LEAST_WIDTH * view.width else None
 
 
