@@ -104,7 +104,8 @@ def find_regions(capture: Capture, faces: tuple[Face, ...], persons: tuple[Perso
     turns = find_quarter_turns(sizes, faces, persons)
     seen = zip(capture.views, faces, persons, turns, strict=True)
     views = [view.with_findings(face, person).turned(int(n)) for view, face, person, n in seen]
-    frames = [view.to_photo(_region(view)) for view in views]
+    parts = _as_large([_region(view) for view in views], views)
+    frames = [view.to_photo(part) for view, part in zip(views, parts, strict=True)]
     middles = [frame.mean(axis=0) for frame in frames]
     return Framing(turns, np.rint(frames).astype(np.int64).reshape(-1, 4), np.array(middles))
 
@@ -120,6 +121,18 @@ def _region(view: View) -> Float64Array:
         part = _around(person_or_hair(view))
     within = part.clip(*inner)
     return within if _is_small(part, view) and (within[1] > within[0]).all() else inner
+
+
+def _as_large(parts: list[Float64Array], views: Sequence[View]) -> list[Float64Array]:
+    """Return parts (2, 2) of pictures, none smaller than the median one.
+
+    A person from behind may be found without the body; what others of the turn show must show there.
+    """
+    edges = np.array([max(view.width, view.height) for view in views])
+    sizes = np.array([(part[1] - part[0]).max() for part in parts])
+    room = np.maximum(np.median(sizes / edges) * edges - sizes, 0) / 2
+    grown = zip(parts, room, views, strict=True)
+    return [(part + [[-r], [r]]).clip(0, (view.width, view.height)) for part, r, view in grown]
 
 
 def _around(alpha: UInt8Array) -> Float64Array:

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from hairkit.imaging import framing
+from hairkit.imaging import framing, hair_network
 from hairkit.imaging.framing import find_framing, find_regions
 from hairkit.io.framed_photos import frame_view, on_photo
 from hairkit.types.capture import Capture, View
@@ -68,7 +68,7 @@ def _bald(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the network find no hair."""
     nothing = np.zeros((8, 8, 3), np.float32)
     monkeypatch.setattr(framing, "hair_probability", lambda *_: nothing)
-    monkeypatch.setattr(framing, "find_hair", lambda *_: nothing)
+    monkeypatch.setattr(hair_network, "find_hair", lambda *_: nothing)
 
 
 def test_small_heads_are_framed_alike() -> None:
@@ -111,6 +111,22 @@ def test_borders_of_one_colour_are_cropped() -> None:
     plain = replace(view, image=np.dstack([200 - person.alpha // 2] * 3))
     found = find_regions(Capture((plain,)), (face,), (person,))
     assert found.frames.tolist() == [[0, 0, WIDTH, HEIGHT]]
+
+
+def test_a_head_found_without_its_body_is_cropped_as_the_others() -> None:
+    """One photo of a turn is no smaller a part than the median one, inside its picture."""
+    shots = [shoot(300, 200, 60) for _ in range(3)]
+    view, face, person = shoot(300, 200, 60)
+    alone = person.alpha.copy()
+    alone[290:] = 0
+    views, faces, persons = zip(*shots, (view, face, Person(alone)), strict=True)
+    frames = find_regions(Capture(views), faces, persons).frames
+    sizes = (frames[:, 2:] - frames[:, :2]).max(axis=1)
+    assert sizes[3] > 0.6 * sizes[0]
+    single = find_regions(Capture(views[3:]), faces[3:], persons[3:]).frames[0]
+    assert (single[2:] - single[:2]).max() < 0.4 * sizes[0]
+    assert (frames >= 0).all()
+    assert (frames[:, 2:] <= [WIDTH, HEIGHT]).all()
 
 
 def test_a_person_in_the_border_and_a_face_of_a_few_pixels_crop_nothing() -> None:

@@ -16,10 +16,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from hairkit import Camera, Capture, View
-from hairkit.arrays import BoolArray, Float64Array
+from hairkit.arrays import BoolArray, Float32Array, Float64Array
 from hairkit.cameras.depth_raster import head_depth
 from hairkit.errors import InputError
 from hairkit.head_model.template import default_head
+from hairkit.imaging import hair_network
 from hairkit.pipeline.figure import GREEN, RED
 from hairkit.pipeline.health import assess_turn
 from hairkit.types.face import Face
@@ -141,6 +142,22 @@ def test_hair_of_the_colour_of_skin_is_hair() -> None:
     assert np.abs(wrap(find(sunny).azimuth_deg - find(shots).azimuth_deg)).max() < 1
     untold = [replace(shot, person=Person(shot.person.alpha)) for shot in sunny]
     assert off(find(untold), shots).max() > off(find(sunny), shots).max()
+
+
+def test_hair_taken_for_background_belongs_to_the_outline(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A head from behind of which the person's network sees the neck alone keeps its place."""
+    shots = ring(CARELESS)
+    want = find(shots)
+
+    def find_hair(view: View) -> Float32Array:
+        return (view.image == HAIR).all(axis=2, keepdims=True).astype(np.float32)
+
+    cut = [*shots]
+    for i in np.flatnonzero([abs(shot.azimuth_deg) > 120 for shot in shots]):
+        seen = np.where(find_hair(shots[i].view)[..., 0] > 0, 0, shots[i].person.alpha)
+        cut[i] = replace(shots[i], person=Person(seen))
+    monkeypatch.setattr(hair_network, "find_hair", find_hair)
+    assert np.abs(wrap(find(cut).azimuth_deg - want.azimuth_deg)).max() < 1
 
 
 @pytest.mark.parametrize(
