@@ -126,13 +126,13 @@ def _region(view: View) -> Float64Array:
 def _as_large(parts: list[Float64Array], views: Sequence[View]) -> list[Float64Array]:
     """Return parts (2, 2) of pictures, none smaller than the median one.
 
-    A person from behind may be found without the body; what others of the turn show must show there.
+    A person from behind may be found without the body, which the other photos show.
     """
     edges = np.array([max(view.width, view.height) for view in views])
     sizes = np.array([(part[1] - part[0]).max() for part in parts])
     room = np.maximum(np.median(sizes / edges) * edges - sizes, 0) / 2
-    grown = zip(parts, room, views, strict=True)
-    return [(part + [[-r], [r]]).clip(0, (view.width, view.height)) for part, r, view in grown]
+    grown = parts + room[:, None, None] * [[-1.0], [1.0]]
+    return [part.clip(0, (v.width, v.height)) for part, v in zip(grown, views, strict=True)]
 
 
 def _around(alpha: UInt8Array) -> Float64Array:

@@ -150,7 +150,7 @@ def test_hair_taken_for_background_belongs_to_the_outline(monkeypatch: pytest.Mo
     want = find(shots)
 
     def find_hair(view: View) -> Float32Array:
-        return (view.image == HAIR).all(axis=2, keepdims=True).astype(np.float32)
+        return np.asarray((view.image == HAIR).all(axis=2, keepdims=True), np.float32)
 
     cut = [*shots]
     for i in np.flatnonzero([abs(shot.azimuth_deg) > 120 for shot in shots]):
