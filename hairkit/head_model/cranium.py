@@ -47,7 +47,7 @@ class Cranium:
         chosen = spread_vertices(head, np.nonzero(head.scalp > 0.5)[0], POINTS)
         shape = np.max([mask.labels.shape for mask in masks], axis=0)
         size = (max(1, round(shape[1] * scale)), max(1, round(shape[0] * scale)))
-        fields = np.stack([_far_from_hair(mask, size) for mask in masks])
+        fields = np.stack([_far_from_hair(mask, size, scale) for mask in masks])
         normals = head.normals()[chosen].astype(np.float64)
         return cls(head.vertices[chosen].astype(np.float64), normals, fields, scale)
 
@@ -84,13 +84,12 @@ class Cranium:
         return np.where(inside, self.fields[view, i, j], 0.0)
 
 
-def _far_from_hair(mask: Mask, size: tuple[int, int]) -> Float32Array:
-    """Return 1 where no hair is near, in a smaller picture."""
-    share = min(1.0, size[1] / mask.labels.shape[0])
+def _far_from_hair(mask: Mask, size: tuple[int, int], scale: float) -> Float32Array:
+    """Return 1 where no hair is near, in a smaller picture, 0 off the mask."""
     other = np.where(mask.labels == HAIR, np.uint8(0), np.uint8(255))
-    small = cv2.resize(other, None, fx=share, fy=share, interpolation=cv2.INTER_AREA)
+    small = cv2.resize(other, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA)
     away = cv2.distanceTransform((small == 255).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5)
     result = np.zeros(size[::-1], np.float32)
     rows, columns = min(small.shape[0], size[1]), min(small.shape[1], size[0])
-    result[:rows, :columns] = away[:rows, :columns] > max(HAIR_GAP * len(small), 1)
+    result[:rows, :columns] = away[:rows, :columns] > max(HAIR_GAP * size[1], 1)
     return result

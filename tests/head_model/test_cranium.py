@@ -9,6 +9,7 @@ from turntable import Turntable, bald_masks, turntable
 from hairkit.arrays import Float64Array
 from hairkit.cameras.outlines import Outlines
 from hairkit.head_model.cranium import Cranium
+from hairkit.types.mask import Mask
 
 
 @pytest.fixture(scope="module")
@@ -48,3 +49,19 @@ def test_outlines_are_bare_where_no_hair_is_near(bust: Turntable) -> None:
     assert crown.any()
     assert not hairy.bare(view, pixels)[crown].any()
     assert not bald.bare(view, pixels + 1e4).any()
+
+
+def test_photos_cut_to_other_sizes_tell_the_same(bust: Turntable) -> None:
+    """A smaller picture of the same camera moves nothing: hair stays where it is."""
+    scale = 0.5
+    height, width = bust.masks[0].labels.shape
+    cut = tuple(
+        Mask(mask.labels[: height - 20 * k], mask.person_known) for k, mask in enumerate(bust.masks)
+    )
+    whole, part = (Cranium.of(bust.head, masks, scale) for masks in (bust.masks, cut))
+    rows, columns = np.mgrid[: height - 20 * len(cut) : 4, :width:4]
+    pixels = np.stack([columns.ravel(), rows.ravel()], axis=1) + 0.5
+    for k in range(len(cut)):
+        view = np.full(len(pixels), k)
+        assert 0 < (whole.bare(view, pixels) == 0).sum() < len(pixels)
+        assert np.array_equal(whole.bare(view, pixels), part.bare(view, pixels))
