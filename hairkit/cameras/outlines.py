@@ -58,6 +58,7 @@ class Outlines:
     @classmethod
     def of(cls, masks: Sequence[Mask], count: int) -> Outlines:
         """Return fields and about `count` contour points a view."""
+        shapes = [mask.labels.shape for mask in masks]
         masks = _of_one_size(masks)
         height, width = masks[0].labels.shape
         scale = min(1.0, FIELD_HEIGHT / height)
@@ -67,7 +68,7 @@ class Outlines:
         for view, mask in enumerate(masks):
             silhouette = _smooth(mask.person if whole else mask.hair, size)
             fields.append(_signed_distance(silhouette) / scale)
-            contour = _contour(fields[-1] * scale, count)
+            contour = _contour(fields[-1] * scale, scale * np.array(shapes[view]), count)
             points.append(contour / scale)
             views.append(np.full(len(contour), view))
         return cls(
@@ -130,16 +131,18 @@ def _signed_distance(silhouette: npt.NDArray[np.bool_]) -> Float32Array:
     return np.asarray(np.clip(distance, -FAR, FAR), np.float32)
 
 
-def _contour(field: Float32Array, count: int) -> Float64Array:
-    """Return about `count` points (n, 2) evenly along the longest outline, without cut edges."""
+def _contour(field: Float32Array, shape: Float64Array, count: int) -> Float64Array:
+    """Return about `count` points (n, 2) evenly along the longest outline in a picture (2,).
+
+    Without its cut edges, and without what a smaller picture was continued by.
+    """
     outlines, _ = cv2.findContours(
         (field > 0).astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE
     )
     if not outlines:
         return np.zeros((0, 2))
     longest = max(outlines, key=len)[:, 0, :].astype(np.float64)
-    height, width = field.shape
-    kept = (longest >= EDGE).all(1) & (longest < [width - EDGE, height - EDGE]).all(1)
+    kept = (longest >= EDGE).all(1) & (longest < shape[::-1] - EDGE).all(1)
     longest = longest[kept]
     if not len(longest):
         return np.zeros((0, 2))

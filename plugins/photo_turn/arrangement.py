@@ -19,9 +19,10 @@ from hairkit.types.face import Face
 
 YAW_DEG = 4.0
 """Standard deviation of the azimuth that a face tells."""
-OBLIQUE_DEG, OBLIQUE_GROWTH = 45.0, 2.0
-"""Yaw from which on faces may be mistaken profiles: the deviation grows by this many degrees for
-each degree beyond. Profiles were found as faces with yaws of 39 to 62 degrees."""
+OBLIQUE_DEG, OBLIQUE_GROWTH = 40.0, 3.0
+"""Yaw from which on faces may be seen from farther aside: the deviation to that side grows by this
+many degrees for each degree beyond. Faces seen from 50 degrees were found with yaws of 41, from 62
+to 69 with 44 to 52, as were some from 41 to 49; profiles with 39 to 62."""
 FACE_CAP = 30.0
 """Largest cost of one face: beyond 30 degrees off, farther is not worse."""
 HIDDEN_DEG, HIDDEN_SPREAD_DEG = 60.0, 10.0
@@ -61,7 +62,7 @@ class Evidence:
     yaw_deg: Float64Array
     """(V,) azimuths that sure faces, or the names of views, tell; NaN without."""
     spread_deg: Float64Array
-    """(V,) standard deviations of these."""
+    """(V,) standard deviations of these, away from the front."""
     side: Float64Array
     """(V,) 1 for photos from the subject's left, -1 from the right, as faint faces tell; else 0."""
     alike: Float64Array | None
@@ -110,6 +111,12 @@ class Evidence:
             odd=self.odd[photos],
             unlike=None if self.unlike is None else self.unlike[pairs],
         )
+
+    def off(self, azimuth_deg: Float64Array) -> tuple[Float64Array, Float64Array]:
+        """Return by how much azimuths (..., V) differ from what faces tell, and the deviation."""
+        off = wrap(azimuth_deg - self.yaw_deg)
+        narrow = np.minimum(self.spread_deg, YAW_DEG)
+        return off, np.where(off * np.sign(self.yaw_deg) > 0, self.spread_deg, narrow)
 
     @cached_property
     def pairs(self) -> tuple[Int64Array, Int64Array]:
@@ -182,7 +189,7 @@ def measure_cost(
 def _face_cost(azimuth: Float64Array, evidence: Evidence) -> Float64Array:
     """Return what it costs that faces look elsewhere and photos from the front show none."""
     seen, faint = np.isfinite(evidence.yaw_deg), evidence.side != 0
-    off = wrap(azimuth[:, seen] - evidence.yaw_deg[seen]) / evidence.spread_deg[seen]
+    off = np.divide(*evidence.off(azimuth))[:, seen]
     inside = HIDDEN_DEG - np.abs(wrap(azimuth[:, ~seen & ~faint]))
     inside = np.maximum(inside, 0) / HIDDEN_SPREAD_DEG
     aside = wrap(azimuth[:, faint] - SIDE_DEG * evidence.side[faint]) / SIDE_SPREAD_DEG

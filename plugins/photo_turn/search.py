@@ -133,8 +133,8 @@ class Search:
         even = np.argsort(np.argsort(azimuth, kind="stable")) * (360.0 / len(azimuth))
         even = _turned_to_faces(np.asarray(even, np.float64), evidence)
         seen = np.isfinite(evidence.yaw_deg)
-        trust = 1 / (1 + (evidence.spread_deg[seen] / STRAY_DEG) ** 2)
-        even[seen] += trust * wrap(evidence.yaw_deg[seen] - even[seen])
+        off, spread = evidence.off(even)
+        even[seen] -= (off / (1 + (spread / STRAY_DEG) ** 2))[seen]
         placed = self._placed(even)
         near = np.abs(wrap(placed.azimuth_deg - best.azimuth_deg)).max() < UNEVEN_DEG
         fits = placed.cost < best.cost + UNEVEN

@@ -123,11 +123,15 @@ def test_the_crown_is_found(bust: Turntable, outlines: Outlines) -> None:
 
 
 def test_a_smaller_picture_keeps_its_pixels(bust: Turntable, outlines: Outlines) -> None:
-    """Rows cut off one picture's bottom leave the other views' distances as they are."""
+    """Rows cut off one picture's bottom leave the other views' distances as they are, and no
+    outline lies below it."""
     labels = [mask.labels for mask in bust.masks]
-    labels[0] = labels[0][:-10]
+    labels[0] = labels[0][:-100]
     cut = Outlines.of([Mask(part, True) for part in labels], 30)
     assert np.array_equal(cut.fields[1:], outlines.fields[1:])
+    rows = cut.points[cut.views == 0, 1]
+    assert len(rows) > 15
+    assert rows.max() < len(labels[0])
 
 
 def test_a_picture_full_of_hair_has_no_outline() -> None:
