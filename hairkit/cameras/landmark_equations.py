@@ -25,8 +25,13 @@ JAW_NOISE, COVERED_NOISE = 2.0, 3.0
 """Times the noise of given landmarks of the jaw, and of those under hair: detectors guess them."""
 FACES = 4
 """Views that show the face in a turn of eight, at most."""
-CROWD_STEEP_DEG, CROWD_STEEP_NOISE = 43.0, 3.0
-"""Yaw from which more faces than that are not needed, and times whose noise they then have."""
+CROWD_STEEP_DEG = 43.0
+"""Yaw from which more faces than that are not needed."""
+STEEP = 1.0
+"""Growth of the noise of a steep face's landmarks for each degree of its yaw. A mesh hardly turns
+farther: faces seen from 52, 58, 65 and 70 degrees have yaws of 47, 50, 51 and 52, some seen from 62
+of 44, and landmarks that are off by 5 to 12 mm, all of a face one way: many tell no more than one.
+"""
 MIDLINE = np.array([27, 28, 29, 30, 33, 51, 57, 8])
 """Nose, lips and chin: they lie on the outline of a view from the side."""
 AFFINE_SPREAD, SMOOTH_SPREAD, SMOOTH_LENGTH = 0.004, 0.004, 0.04
@@ -42,11 +47,18 @@ above let it vary by 3.6 %. Cameras pull it, too, all one way: with 0.02 the sca
 0.93 to 0.99, with 0.012 it is 0.95 to 1.00."""
 
 
-def steep_faces(views: Sequence[View]) -> list[bool]:
-    """Return which views show a face that is turned too far; fewer where few show one."""
+def steepness(views: Sequence[View]) -> Float64Array:
+    """Return by how many degrees (V,) faces are turned too far, by yaw or azimuth; 0 for the rest.
+
+    Where few views show a face, more of them are needed.
+    """
     few = sum(view.landmarks is not None for view in views) <= FACES
-    most = STEEP_YAW_DEG if few else CROWD_STEEP_DEG
-    return [view.face is not None and abs(view.face.yaw_deg) > most for view in views]
+    seen = np.array([
+        0.0 if view.face is None
+        else max(abs(view.face.yaw_deg), 180 - abs(view.azimuth_deg % 360 - 180))
+        for view in views
+    ])  # fmt: skip
+    return np.maximum(seen - (STEEP_YAW_DEG if few else CROWD_STEEP_DEG), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +85,7 @@ class Sights:
         shown = sum(view.landmarks is not None for view in capture.views)
         usual = np.broadcast_to(noise, len(masks))
         crowded = np.sqrt(max(1.0, shown / FACES))
-        spare = CROWD_STEEP_NOISE if shown > FACES else 1.0
-        steep = steep_faces(capture.views)
+        less = 1 + STEEP * steepness(capture.views)
         for index, (view, mask) in enumerate(zip(capture.views, masks, strict=True)):
             if view.landmarks is None:
                 continue
@@ -84,7 +95,7 @@ class Sights:
             for point, (x, y) in enumerate(view.landmarks):
                 inside = 0 <= x < view.width and 0 <= y < view.height
                 covered = inside and mask.labels[int(y), int(x)] == HAIR
-                trust = (COVERED_NOISE if covered else 1.0) * (spare if steep[index] else 1.0)
+                trust = (COVERED_NOISE if covered else 1.0) * less[index]
                 rows.append((index, point, x, y, own[point] * trust * crowded))
         return cls.of_rows(rows)
 

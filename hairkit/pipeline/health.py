@@ -15,7 +15,7 @@ import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.cameras.depth_raster import HEAD_TOLERANCE, SPLAT_CELLS, head_depth, point_depth
-from hairkit.cameras.landmark_equations import steep_faces
+from hairkit.cameras.landmark_equations import steepness
 from hairkit.field.cell_shells import dense_surface
 from hairkit.field.growth_prior import PARTED_HAIR
 from hairkit.pipeline.drawn_hair import (
@@ -184,8 +184,8 @@ def assess_landmarks(capture: Capture, scene: Scene) -> tuple[Figure, ...]:
     if corners is None:
         return tuple(figures)
     points = scene.head.vertices[corners].astype(np.float64)
-    steep = steep_faces([view for view, _ in known])
-    known = [each for each, far in zip(known, steep, strict=True) if not far]
+    steep = steepness([view for view, _ in known])
+    known = [each for each, far in zip(known, steep, strict=True) if far == 0]
     gaps = [_misfit_mm(camera, points, view.landmarks) for view, camera in known]
     if gaps:
         worst = known[int(np.argmax(gaps))][0]

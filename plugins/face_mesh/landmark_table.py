@@ -14,7 +14,6 @@ from pathlib import Path
 import numpy as np
 
 from hairkit.arrays import BoolArray, Float64Array
-from hairkit.types.face import STEEP_YAW_DEG
 from hairkit.types.head import LANDMARKS
 
 MESH, MESH_POINTS = "face_landmark", 468
@@ -22,10 +21,6 @@ TABLE = Path(__file__).with_name("landmark_table.csv")
 NOISE = Path(__file__).with_name("landmark_noise.csv")
 OBLIQUE_DEG = 45.0
 """Yaw of the second column of `landmark_noise.csv`."""
-STEEP = 1.0
-"""Growth of the noise for each degree of yaw of a steep face. The mesh hardly turns farther: faces
-seen from 52, 58, 65 and 70 degrees have yaws of 47, 50, 51 and 52, and landmarks that are off by 5,
-6, 9 and 12 mm, all of a face one way, so that many tell no more than one."""
 MIRROR = np.array(
     [*range(16, -1, -1), *range(26, 16, -1), 27, 28, 29, 30, *range(35, 30, -1),
      45, 44, 43, 42, 47, 46, 39, 38, 37, 36, 41, 40, *range(54, 47, -1), *range(59, 54, -1),
@@ -49,8 +44,8 @@ def pick_landmarks(meshes: Float64Array, mirrored: BoolArray) -> Float64Array:
 def noise_of(yaw_deg: float, size: float) -> Float64Array:
     """Return the standard deviation (68,) of landmarks in pixels, for a crop of `size` pixels."""
     front, oblique = _noise().T
-    share, steep = min(abs(yaw_deg) / OBLIQUE_DEG, 1.0), max(abs(yaw_deg) - STEEP_YAW_DEG, 0.0)
-    noise: Float64Array = size * (1 + STEEP * steep) * (front + share * (oblique - front))
+    share = min(abs(yaw_deg) / OBLIQUE_DEG, 1.0)
+    noise: Float64Array = size * (front + share * (oblique - front))
     return noise
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from turntable import Turntable, turntable
@@ -12,7 +14,7 @@ from hairkit.cameras.landmark_equations import (
     LandmarkFit,
     Sights,
     shape_precision,
-    steep_faces,
+    steepness,
 )
 from hairkit.cameras.outlines import Outlines
 from hairkit.cameras.turntable import Turn
@@ -58,30 +60,35 @@ def test_landmarks_under_hair_and_of_the_jaw_count_less(bust: Turntable) -> None
     assert set(sights.noise / open_air.noise) <= {1.0, 3.0}
 
 
-def test_steep_faces_count_less_where_many_are_seen() -> None:
-    """Of more than four faces those turned by 44 degrees or more are not relied on."""
-    yaws = (-46.0, -20.0, 0.0, 20.0, 44.0)
+def faces_at(*seen: tuple[float, float]) -> tuple[View, ...]:
+    """Return views at azimuths with faces found at yaws, degrees."""
     points, unknown = np.full((68, 2), 5.0), np.zeros(68)
-    views = tuple(
-        View(str(yaw), yaw, np.zeros((9, 9, 3), np.uint8)).with_findings(
+    return tuple(
+        View(str(k), azimuth, np.zeros((9, 9, 3), np.uint8)).with_findings(
             Face(1.0, points, unknown, yaw, 0.0, 0.0), Person.absent()
         )
-        for yaw in yaws
+        for k, (azimuth, yaw) in enumerate(seen)
     )
+
+
+def test_steep_faces_count_less_where_many_are_seen() -> None:
+    """Of more than four faces those turned by 44 degrees are half as sure, by 46 a quarter."""
+    views = faces_at((-46, -46), (-20, -20), (0, 0), (20, 20), (44, 44))
     masks = (Mask(np.where(np.eye(9) > 0, 128, 255).astype(np.uint8), True),) * 5
     noise = Sights.of(Capture(views), masks, 1.0).noise.reshape(5, 68)
-    assert np.allclose(noise[[0, 4]], 3 * noise[1:3])
+    assert np.allclose(noise[4], 2 * noise[1])
+    assert np.allclose(noise[0], 4 * noise[1])
     few = Sights.of(Capture(views[:4]), masks[:4], 1.0).noise.reshape(4, 68)
     assert np.array_equal(few[0], few[1])
-    assert steep_faces(views) == [True, False, False, False, True]
-    assert steep_faces(views[:4]) == [False] * 4
+    assert steepness(views).tolist() == [3, 0, 0, 0, 1]
+    assert steepness(views[:4]).tolist() == [0] * 4
 
 
-def test_few_faces_are_steep_from_a_larger_yaw() -> None:
-    """What little they tell is needed, until their landmarks are off by 5 mm."""
-    face = Face(1.0, np.full((68, 2), 5.0), np.ones(68), 48.0, 0.0, 0.0)
-    view = View("front-left", 45.0, np.zeros((9, 9, 3), np.uint8))
-    assert steep_faces([view.with_findings(face, Person.absent())]) == [True]
+def test_a_face_is_as_steep_as_the_turn_has_it() -> None:
+    """One seen from farther aside than it seems is hardly relied on: few are steep from 47 on."""
+    assert steepness(faces_at((45, 48), (62, 45), (290, -44), (0, 0))).tolist() == [1, 15, 23, 0]
+    unseen = replace(faces_at((90, 0))[0], face=None)
+    assert steepness([unseen]).tolist() == [0]
 
 
 def test_the_pull_of_the_true_cameras_is_weak(bust: Turntable, fit: LandmarkFit) -> None:
