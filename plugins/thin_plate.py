@@ -17,6 +17,7 @@ from scipy.ndimage import map_coordinates
 
 from hairkit import Camera, Capture, Head, Mask, Scene, hookimpl
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
+from hairkit.cameras.landmark_equations import STEEP, steepness
 from hairkit.cameras.outlines import Outlines
 from hairkit.cameras.similarity import triangulate
 from hairkit.head_model.cranium import LEAST_SHARE, RIM, Cranium
@@ -84,7 +85,8 @@ def _bend_to_landmarks(capture: Capture, scene: Scene, options: Options) -> Head
         return head
     pixels = np.stack([view.landmarks for view in capture.views if view.landmarks is not None])
     cameras = [camera for camera, has in zip(scene.cameras, seen, strict=True) if has]
-    points = triangulate(cameras, pixels)
+    less = (1 + STEEP * steepness(capture.views)[seen]) ** -2.0
+    points = triangulate(cameras, pixels, np.repeat(less[:, None], LANDMARKS, axis=1))
     source = head.vertices[head.landmark_vertices].astype(np.float64)
     # scalp behind the ears' plane, of which the landmarks know nothing
     behind = head.vertices[:, 2] < np.median(head.vertices[:, 2])
