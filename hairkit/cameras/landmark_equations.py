@@ -27,6 +27,8 @@ FACES = 4
 """Views that show the face in a turn of eight, at most."""
 CROWD_STEEP_DEG = 43.0
 """Yaw from which more faces than that are not needed."""
+UNLIKE_DEG = 8.0
+"""Difference up to which a face's yaw is that of the turn."""
 STEEP = 1.0
 """Growth of the noise of a steep face's landmarks for each degree of its yaw. A mesh hardly turns
 farther: faces seen from 52, 58, 65 and 70 degrees have yaws of 47, 50, 51 and 52, some seen from 62
@@ -48,17 +50,17 @@ above let it vary by 3.6 %. Cameras pull it, too, all one way: with 0.02 the sca
 
 
 def steepness(views: Sequence[View]) -> Float64Array:
-    """Return by how many degrees (V,) faces are turned too far, by yaw or azimuth; 0 for the rest.
+    """Return by how many degrees (V,) faces are turned too far, 0 for the rest.
 
-    Where few views show a face, more of them are needed.
+    By their yaws, or beyond them, as the turn has it. Where few views show a face, more are needed.
     """
     few = sum(view.landmarks is not None for view in views) <= FACES
-    seen = np.array([
-        0.0 if view.face is None
-        else max(abs(view.face.yaw_deg), 180 - abs(view.azimuth_deg % 360 - 180))
-        for view in views
-    ])  # fmt: skip
-    return np.maximum(seen - (STEEP_YAW_DEG if few else CROWD_STEEP_DEG), 0.0)
+    faces = [(v.azimuth_deg, 0.0 if v.face is None else v.face.yaw_deg) for v in views]
+    azimuth, yaw = np.array(faces).T
+    beyond = 180 - np.abs((azimuth - yaw) % 360 - 180) - UNLIKE_DEG
+    steep = np.abs(yaw) - (STEEP_YAW_DEG if few else CROWD_STEEP_DEG)
+    seen = np.array([view.face is not None for view in views])
+    return np.where(seen, np.maximum(np.maximum(steep, beyond), 0.0), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
