@@ -72,6 +72,9 @@ photographed persons."""
 LEAST_TURNS = 2.0
 """Turns below which hair has no waves. Straight short hair of two photographed persons was 1.03 and
 1.15 of what was taken for a pitch long; wavy and curly hair of the captures is 3.3 to 4.4."""
+WIDEST = 0.02
+"""Metres: radius from which what repeats is no curl. Tied hair, all of which runs along its tail,
+was measured as 42 mm wide; hot rollers make curls of 15 to 20 mm."""
 EVEN = 0.06
 """Angular moments of hair that runs in all directions alike: 21 of 24 portraits of kinky hair have
 less, straight hair has 0.2 and more. Half of the views at least must show enough hair to tell."""
@@ -122,10 +125,11 @@ def measure_waves(
     pitch, prominence = _measure_pitch(views, fewest)
     moments = _angular_moments(views, fewest) if prominence >= LEAST_PROMINENCE else None
     slope = 0.0 if moments is None else _fit_slope(*moments)
+    radius = slope * pitch / (2 * np.pi)
     short = scalp_distance is not None and scalp_distance.hair_length < LEAST_TURNS * pitch
-    if slope < LEAST_SLOPE or short:
+    if slope < LEAST_SLOPE or radius > WIDEST or short:
         return Waves()
-    return Waves(slope * pitch / (2 * np.pi), pitch, _measure_slant(orientations, masks))
+    return Waves(radius, pitch, _measure_slant(orientations, masks))
 
 
 def _are_coils(views: Sequence[tuple[Float32Array, Float32Array]]) -> bool:

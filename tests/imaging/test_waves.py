@@ -95,6 +95,11 @@ def test_waves_of_nine_centimetres_are_no_straight_hair() -> None:
     assert not waves.curly
 
 
+def test_coils_wider_than_hot_rollers_are_none() -> None:
+    """A radius of 3 cm is no curl's: tied hair measured so became a ball of wool."""
+    assert measure_waves(*views_of(drawing(0.03, 0.06))) == Waves()
+
+
 def test_views_that_do_not_agree_show_no_waves() -> None:
     """The shading of locks repeats at another length in each photo; one that differs among four
     does not hide the waves of the others."""
