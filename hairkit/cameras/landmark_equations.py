@@ -25,8 +25,6 @@ JAW_NOISE, COVERED_NOISE = 2.0, 3.0
 """Times the noise of given landmarks of the jaw, and of those under hair: detectors guess them."""
 FACES = 4
 """Views that show the face in a turn of eight, at most."""
-CROWD_STEEP_DEG = 43.0
-"""Yaw from which more faces than that are not needed."""
 UNLIKE_DEG = 8.0
 """Difference up to which a face's yaw is that of the turn."""
 STEEP = 1.0
@@ -52,13 +50,12 @@ above let it vary by 3.6 %. Cameras pull it, too, all one way: with 0.02 the sca
 def steepness(views: Sequence[View]) -> Float64Array:
     """Return by how many degrees (V,) faces are turned too far, 0 for the rest.
 
-    By their yaws, or beyond them, as the turn has it. Where few views show a face, more are needed.
+    By their yaws, or beyond them, as the turn has it.
     """
-    few = sum(view.landmarks is not None for view in views) <= FACES
     faces = [(v.azimuth_deg, 0.0 if v.face is None else v.face.yaw_deg) for v in views]
     azimuth, yaw = np.array(faces).T
     beyond = 180 - np.abs((azimuth - yaw) % 360 - 180) - UNLIKE_DEG
-    steep = np.abs(yaw) - (STEEP_YAW_DEG if few else CROWD_STEEP_DEG)
+    steep = np.abs(yaw) - STEEP_YAW_DEG
     seen = np.array([view.face is not None for view in views])
     return np.where(seen, np.maximum(np.maximum(steep, beyond), 0.0), 0.0)
 

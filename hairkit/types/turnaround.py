@@ -12,8 +12,9 @@ from hairkit.storage import Stored
 
 RING_DEG = 35.0
 """Photos from higher than this are no part of the ring around the head."""
-ELSEWHERE_DEG = 30.0
-"""A photo has another place where its azimuth differs by more than this and than half a step."""
+ELSEWHERE_DEG, ELSEWHERE_STEPS = 30.0, (0.5, 0.75)
+"""A photo has another place where its azimuth differs by more degrees than this, and than the first
+share of an even step, or by more than the second."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +78,7 @@ def moved_photos(
     >>> moved_photos(here, level, np.array([10.0, 180.0, 90.0, -90.0]), level).tolist()
     [False, True, True, False]
     """
-    least = max(ELSEWHERE_DEG, 180.0 / np.count_nonzero(~above))
+    low, high = np.multiply(ELSEWHERE_STEPS, 360.0 / np.count_nonzero(~above))
+    least = np.clip(ELSEWHERE_DEG, low, high)
     away = np.abs((azimuth_deg - other_deg + 180.0) % 360.0 - 180.0) > least
     return np.asarray((away & ~above & ~other_above) | (above != other_above))

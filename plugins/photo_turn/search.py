@@ -35,7 +35,9 @@ UNEVEN, UNEVEN_DEG = 4.0, 15.0
 """Cost and distance of a photo up to which the steps of a turn are taken for even: outlines and
 skin pull photos by 2 to 10 degrees from where they are."""
 OTHERS = 8
-"""Different arrangements near the best one from which the search for the next best starts."""
+"""Different arrangements near a good one from which the search for others starts."""
+ROUNDS_NEAR, NEAREST = 2, 4
+"""Times that others are looked for, near so many of the best."""
 
 
 def find_arrangements(
@@ -66,12 +68,20 @@ def find_arrangements(
     left = np.nonzero(~found[0].above)[0]
     paid = found[0].cost - measure_cost(found[0].azimuth_deg[None, left], evidence.only(left))
     around = Search(evidence, left, fixed[left], float(paid[0]))
-    first, *others = sorted(found + around.near(found[0]), key=lambda placed: placed.cost)
-    distinct = [first]
-    for other in others:
+    for _ in range(ROUNDS_NEAR):
+        ring = [each for each in _distinct(found) if (each.above == found[0].above).all()]
+        found += [other for each in ring[:NEAREST] for other in around.near(each)]
+    distinct = _distinct(found)
+    return [around.evened(distinct[0]), *distinct[1:]]
+
+
+def _distinct(found: list[Placed]) -> list[Placed]:
+    """Return arrangements by their cost that put some photo elsewhere than all before."""
+    distinct: list[Placed] = []
+    for other in sorted(found, key=lambda placed: placed.cost):
         if all(moved(other, each).any() for each in distinct):
             distinct.append(other)
-    return [around.evened(first), *distinct[1:]]
+    return distinct
 
 
 def margin_of(placed: list[Placed]) -> float:
@@ -119,7 +129,7 @@ class Search:
         evidence = self.everything.only(self.photos)
         azimuth = best.azimuth_deg[self.photos]
         rows = [self._swapped(azimuth, int(photo)) for photo in np.nonzero(~self.fixed)[0]]
-        trials = np.concatenate([*rows, self._mirrored(azimuth)])
+        trials = np.concatenate([*rows, self._mirrored(azimuth), self._inserted(azimuth)])
         trials = trials[np.argsort(measure_cost(trials, evidence), kind="stable")]
         others = [trial for trial in trials if moved(self._placed(trial), best).any()][:OTHERS]
         settled = [self._settle(other, evidence) for other in others]
@@ -176,6 +186,16 @@ class Search:
         swapped, rows = np.repeat(azimuth[None], len(others), axis=0), np.arange(len(others))
         swapped[:, photo], swapped[rows, others] = azimuth[others], azimuth[photo]
         return swapped
+
+    def _inserted(self, azimuth: Float64Array) -> Float64Array:
+        """Return arrangements (M, R) with one photo elsewhere in the order around the head."""
+        free = np.nonzero(~self.fixed)[0]
+        around = free[np.argsort(azimuth[free] % 360.0)]
+        places = np.ndindex(len(around), len(around))
+        orders = [np.insert(np.delete(around, i), j, around[i]) for i, j in places]
+        inserted = np.repeat(azimuth[None], len(orders), axis=0)
+        inserted[np.arange(len(orders))[:, None], np.array(orders)] = azimuth[around]
+        return inserted
 
     def _mirrored(self, azimuth: Float64Array) -> Float64Array:
         """Return arrangements (M, R) with the photos between any two in reverse order."""
