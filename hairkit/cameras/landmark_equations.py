@@ -52,12 +52,10 @@ def steepness(views: Sequence[View]) -> Float64Array:
 
     By their yaws, or beyond them, as the turn has it.
     """
-    faces = [(v.azimuth_deg, 0.0 if v.face is None else v.face.yaw_deg) for v in views]
+    faces = [(v.azimuth_deg, v.face.yaw_deg) if v.face else (0.0, 0.0) for v in views]
     azimuth, yaw = np.array(faces).T
     beyond = 180 - np.abs((azimuth - yaw) % 360 - 180) - UNLIKE_DEG
-    steep = np.abs(yaw) - STEEP_YAW_DEG
-    seen = np.array([view.face is not None for view in views])
-    return np.where(seen, np.maximum(np.maximum(steep, beyond), 0.0), 0.0)
+    return np.asarray(np.maximum(np.abs(yaw) - STEEP_YAW_DEG, beyond).clip(0), np.float64)
 
 
 @dataclass(frozen=True, eq=False)

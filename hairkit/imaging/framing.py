@@ -16,12 +16,7 @@ import numpy as np
 
 from hairkit.arrays import BoolArray, Float64Array, Int64Array, UInt8Array
 from hairkit.imaging.hair_features import EYES, MOUTH
-from hairkit.imaging.hair_network import (
-    hair_probability,
-    likely_landmarks,
-    person_or_hair,
-    silhouette,
-)
+from hairkit.imaging.hair_network import hair_probability, likely_landmarks, silhouette
 from hairkit.imaging.person_outline import PERSON_LEVEL, trace_outline
 from hairkit.types.capture import Capture, View
 from hairkit.types.face import SURE_PRESENCE, Face
@@ -118,7 +113,7 @@ def _region(view: View) -> Float64Array:
         return inner
     part = _around(view.person.alpha)
     if _is_small(part, view):  # a large person is no smaller with hair
-        part = _around(person_or_hair(view))
+        part = _around(silhouette(view))
     within = part.clip(*inner)
     return within if _is_small(part, view) and (within[1] > within[0]).all() else inner
 

@@ -78,12 +78,8 @@ def silhouette(view: View) -> UInt8Array:
     Where no face shows, hair may be all that shows: then what may be hair is the person's, too.
     """
     assert view.person is not None
-    return person_or_hair(view) if likely_landmarks(view) is None else view.person.alpha
-
-
-def person_or_hair(view: View) -> UInt8Array:
-    """Return the larger (H, W) of the probabilities of the person and of hair, of 255."""
-    assert view.person is not None
+    if likely_landmarks(view) is not None:
+        return view.person.alpha
     hair = cv2.resize(find_hair(view)[..., 0], (view.width, view.height))
     return np.maximum(view.person.alpha, (255 * hair).astype(np.uint8))
 

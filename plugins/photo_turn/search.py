@@ -128,8 +128,7 @@ class Search:
         """Return the cheapest ways to put photos in another order, and what is found from them."""
         evidence = self.everything.only(self.photos)
         azimuth = best.azimuth_deg[self.photos]
-        rows = [self._swapped(azimuth, int(photo)) for photo in np.nonzero(~self.fixed)[0]]
-        trials = np.concatenate([*rows, self._mirrored(azimuth), self._inserted(azimuth)])
+        trials = np.concatenate([self._mirrored(azimuth), self._inserted(azimuth)])
         trials = trials[np.argsort(measure_cost(trials, evidence), kind="stable")]
         others = [trial for trial in trials if moved(self._placed(trial), best).any()][:OTHERS]
         settled = [self._settle(other, evidence) for other in others]

@@ -10,8 +10,9 @@ import cv2
 import numpy as np
 import pytest
 from hairkit_plugins.photo_turn import find_turn
-from hairkit_plugins.photo_turn.arrangement import Placed, wrap
+from hairkit_plugins.photo_turn.arrangement import Evidence, Placed, wrap
 from hairkit_plugins.photo_turn.refuse import check_turn
+from hairkit_plugins.photo_turn.search import Search
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
@@ -203,6 +204,27 @@ def test_any_number_of_photos_is_placed(count: int) -> None:
     found = find(shots)
     assert off(found, shots).max() < 15
     assert len(set(found.names)) == count
+
+
+def test_neighbours_of_twelve_that_change_places_are_another_turn() -> None:
+    """They are 30 degrees apart; a turn by half a step is none, nor one of eight by 20 degrees."""
+    level, even = np.zeros(12, bool), np.arange(12) * 30.0
+    changed = even[[0, 1, 2, 3, 5, 4, *range(6, 12)]]
+    assert moved_photos(even, level, changed, level).nonzero()[0].tolist() == [4, 5]
+    assert not moved_photos(even, level, even + 15, level).any()
+    assert not moved_photos(even[:8], level[:8], even[:8] + 20, level[:8]).any()
+
+
+def test_any_photo_is_tried_in_any_place_of_the_order() -> None:
+    """The places stay; nothing that is known moves."""
+    shots = ring(EIGHT)
+    evidence = Evidence.of([shot.face for shot in shots])
+    fixed = np.arange(8) == 2
+    azimuth = np.array([shot.azimuth_deg for shot in shots])
+    tried = Search(evidence, np.arange(8), fixed).near(Placed(azimuth, fixed & ~fixed, azimuth, 0))
+    orders = {tuple(np.argsort(each.azimuth_deg % 360)) for each in tried}
+    assert (0, 1, 2, 4, 5, 3, 6, 7) in orders
+    assert all(each.azimuth_deg[2] == azimuth[2] for each in tried)
 
 
 @pytest.mark.parametrize("place", [0, 3, 8])
