@@ -34,7 +34,6 @@ from hairkit.types.volume import Hull, OrientationField, VoxelGrid, outer_produc
 
 VIEW_NAMES = tuple(TURN)
 """Views of the nominal turn, 45 degrees apart, towards the subject's left."""
-
 _WIDTH, _HEIGHT = 96, 128
 """Pixels of a photo."""
 _FOCAL = 200.0

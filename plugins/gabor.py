@@ -39,19 +39,14 @@ from hairkit.types.orientation import OrientationMap, wrap_angle
 
 _CHUNK = 4096
 """Pixels handled at a time, so that their responses fit into the cache."""
-
 _BASIS_TOLERANCE = 1e-4
 """Relative error allowed when the bank is written in fewer basis kernels."""
-
 _TOP_QUANTILE = 0.99
 """Quantile of the confidence that becomes 1, so that outliers do not dim the rest."""
-
 _DOG_FINE, _DOG_WIDE = 0.4, 10.0
 """Sigmas in pixels of the two Gaussians whose difference keeps detail."""
-
 _EDGE_SIGMA = 1.0
 """Gaussian in pixels by which the mask's edge, which mixes hair and backdrop, is left out."""
-
 _LEAST_RIPPLE = 0.5 / 255
 """Amplitude of stripes below which a picture counts as constant: half a grey level."""
 

@@ -26,13 +26,10 @@ from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
 
 _GAMMA = {"as_is": 1.0, "brighter": 0.7, "much_brighter": 0.5, "darker": 1.4}
 """Exponent of the brightness in [0, 1] for each preset."""
-
 _RECTANGLE_MARGIN = 2
 """Reduced pixels by which the hair may be outside the rectangle; a hand draws no better."""
-
 _SIDE_STRIP = 2
 """Reduced pixels at the picture's sides that are backdrop where the rectangle ends before them."""
-
 _OUTSIDE = 0.5
 """Share of a background stroke outside the rectangle that makes it a stroke on the backdrop."""
 

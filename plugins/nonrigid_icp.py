@@ -67,7 +67,6 @@ SPREAD_POINTS = 100_000
 """Points spread over the faces of a scanned mesh: 2 mm apart on a head and neck."""
 CONTROLS = 300
 """Vertices by which joints, capsules and shapes are carried along."""
-
 _FACES = re.compile(rb"^element face 0*[1-9]", re.MULTILINE)
 """In the header of a PLY file with faces."""
 

@@ -44,30 +44,22 @@ from hairkit.types.orientation import OrientationMap
 
 _SCHARR_GAIN = 32.0
 """Response of `cv2.Scharr` to a slope of one per pixel."""
-
 _LEAST_GRADIENT_SIGMA = 0.7
 """Pixels; the Scharr kernel's own width, which a narrower Gaussian does not reduce."""
-
 _NOISE_SIGMA = 4.0
 """Gaussian in cells of a level under which the power of its detail is measured."""
-
 _TOP_QUANTILE, _LEAST_TOP = 0.95, 0.25
 """Quantile of the confidence that becomes 1, and the least value of it, so that the confidence of a
 picture of nothing but noise stays low."""
-
 _LEVEL_SIGMA = 1.0
 """Gaussian in cells of the finest level: its window is one step wide."""
-
 _LEAST_ENERGY = 1e-3
 """Energy, as a share of that of full contrast, below which a window's direction is unknown."""
-
 _AGREEMENT_SIGMA = 10.0
 """Pixels over which neighbouring angles should agree."""
-
 _AGREEMENT_POWER = 16
 """The mean resultant of angles with deviation s is exp(-2 s^2); to this power, exp(-32 s^2): half
 of the confidence is gone when neighbours differ by 8 degrees."""
-
 _SURE_COHERENCE = 0.14
 """Coherence with a confidence of one half; straight hair has twice, white noise a tenth of it."""
 

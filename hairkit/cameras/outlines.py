@@ -14,28 +14,16 @@ from hairkit.types.mask import Mask
 
 FIELD_HEIGHT = 540
 """Signed distances are sampled at about this many rows."""
-
-
 SMOOTHING_PX = 2.0
 """Gaussian that closes holes between hairs and drops flying ones, field pixels."""
-
-
 SLOPE_SMOOTHING_PX = 1.5
 """Gaussian of the field by whose gradient contour points move to the edge, field pixels."""
-
-
 LEAST_SLOPE = 0.1
 """Least square of the gradient by which contour points move: it is 1 off the medial axis."""
-
-
 MASK_SIZE = cv2.DIST_MASK_5
 """Window of the chamfer distance transform."""
-
-
 EDGE = 4
 """Contour points this near to the picture's edge, in field pixels, are cuts and no outline."""
-
-
 FAR = 1e5
 """Signed distance, in field pixels, where a picture shows no outline at all."""
 

@@ -35,10 +35,8 @@ Check Python, the packages, OpenGL, caches and plugins, and say what to install.
 
 _MODULES = {"opencv-python-headless": "cv2"}
 """Distributions whose module has another name."""
-
 _NOT_FOR_USERS = ("all", "test", "docs", "dev")
 """Extras for work on hairkit, and the one that stands for all others."""
-
 _NO_CACHE = "no locator available"
 """Numba's message if it has no folder for compiled code."""
 

@@ -34,7 +34,6 @@ NECK_SLICE = 0.02
 """Height of the lowest part of a head's mesh whose middle is the neck's, metres."""
 EDGE_PX = 4
 """The mask is eroded by this many pixels before orientation errors are taken."""
-
 HIDDEN, RIGHT, WRONG = 0, 1, 2
 """Verdicts on a drawn sample; hidden also where the truth has no hair."""
 

@@ -22,8 +22,6 @@ SHORTEST_STRAND = 0.01
 """Strands shorter than this many metres are dropped on both sides."""
 OUTER_DEPTH = 0.003
 """A predicted sample is outer at most this far behind some view's first surface, metres."""
-
-
 ANY_DIRECTION = 90.0
 """Largest angle in degrees between directions whose sign does not count."""
 OCCUPANCY_VOXEL = 0.003

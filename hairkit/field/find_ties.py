@@ -45,8 +45,6 @@ FARTHEST_APART = 0.05
 LEAST_FRINGE, SHORTEST_FRINGE = 4e-6, 0.045
 """Cubic metres of loose hair, and its way from the scalp in metres, that make a fringe: edges of
 masks leave parts of up to 1.8e-6 and 0.034 below the hairline."""
-
-
 TIE_SEARCH = 0.045
 """Metres about the neck in which cells nearer to the scalp belong to the bundle, not to the ghosts
 beside it."""

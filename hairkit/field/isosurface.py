@@ -20,7 +20,6 @@ BLUR = 1.0
 """Standard deviation of the smoothing, cells."""
 LEVEL = 0.35
 """Share of occupied cells at the surface; below a half, so that a sheet of one cell stays."""
-
 _CORNERS = np.array(list(itertools.product((0, 1), repeat=3)))
 _EDGES = [
     (a, b)

@@ -23,7 +23,6 @@ from hairkit.types.waves import Waves
 
 SHORTEST = 1e-3
 """Strands shorter than this are no strands, metres."""
-
 ENOUGH = 0.98
 """Share of roots that should give a strand."""
 

@@ -34,20 +34,16 @@ from hairkit.types.strands import Strands
 TIP_SHADE = 0.45
 """How bright tips are in photos over hair of the same colour near the crown, in linear light: 0.27
 to 0.65 in eight path-traced captures."""
-
 LIGHT = 0.67
 """How bright hair is drawn under the light at its camera, over its colour, in linear light. With it
 the mean luma of hair drawn by its own cameras is 0.93 to 1.15 of the photos' on ten captures, of
 straight hair more than of waves, whose locks shade each other; 1.6 where coils become straight."""
-
 DEPTH = 0.87
 """Power of the channels of a colour, over their mean, with which hair is drawn as colourful as it
 was photographed: the film curve of pictures deepens dark colours. On ten captures chroma is 0.97 of
 the photos' in the mean, and 0.09 off on a scale of logarithms."""
-
 DARKEST = 1e-4
 """Least brightness that is divided by."""
-
 _EDGE_PX, _MOST_PIXELS = 4, 20_000
 HEIGHT = 240
 """Of the pictures in pixels."""

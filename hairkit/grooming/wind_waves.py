@@ -21,7 +21,6 @@ PHASE_AMPLITUDE = 2.5
 RADIUS_SPREAD, PITCH_SPREAD = 0.2, 0.1
 """Standard deviations between wisps, as shares: 0.21 and 0.22, 0.07 and 0.14 on wavy and curly
 heads. They leave F at 4 mm within 1 of what it is without."""
-
 LARGEST_RADIUS = 1 + np.sqrt(2) * RADIUS_SPREAD
 """Of the widest wisps, as a share of the mean: a sine's amplitude is root 2 of its spread."""
 RAMP = 0.03

@@ -36,7 +36,6 @@ SHARE = IRIS_RADIUS / (LOWER_LID[-1][0] - LOWER_LID[0][0])
 """Radius of the iris in shares of the distance of the corners."""
 FEWEST = 6
 """Pixels that a colour is measured on at least."""
-
 DEEPEST = 1.5
 """Largest factor by which lids and brows darken the eyes: the white tells how much they do."""
 EYE_MARGIN = 0.0015

@@ -51,7 +51,6 @@ _BUMPS: dict[str, list[tuple[float, ...]]] = {  # middle (3), reach (3), move (3
 }
 MODES = (*_STRETCHES, *_LIFTS, *_BUMPS)
 """Names of the modes, in the order of `identity_modes`."""
-
 BASE_SHAPES: dict[str, dict[str, float]] = {
     "woman": {"head_breadth": -0.5, "head_length": -0.7, "jaw_breadth": -0.8, "brow_ridge": -1.2,
               "face_height": -0.7, "neck_breadth": -1.2, "nose_protrusion": -0.4, "chin": -0.5,

@@ -19,32 +19,23 @@ from hairkit.types.mask import BACKGROUND, HAIR, PERSON
 
 _SIGMAS = (4.0, 12.0, 36.0)
 """Gaussians in reduced pixels of the local means; wider ones count where narrower have nothing."""
-
 _CELL_OF_SIGMA = 2
 """Gaussians are computed on cells of half their sigma."""
-
 _FADE = 0.02
 """Weight of a Gaussian against the next narrower one."""
-
 _NO_WEIGHT = 1e-9
 """Weight of all Gaussians below which a pixel has no sure pixel nearby."""
-
 _NOISE = 30.0
 """Squared distance in Lab from the line between two means that costs one unit: 5.5 in Lab."""
-
 _PER_PIXEL = 0.15
 """Cost of a class for each reduced pixel of distance from its nearest sure pixel."""
-
 _SURE_MARGIN, _THIN_PERSON = 7, 9
 """Edges in reduced pixels of the discs that a sure pixel's label has to fill, and that opens the
 person's label, so that strips of it between hair and background are unsure."""
-
 _LEAST_BLUR = 0.3
 """Least Gaussian in pixels of the full picture under which colours are compared."""
-
 _NEARBY = 13
 """Edge in reduced pixels of the disc around hair in which edges are refined."""
-
 HAIR_OVER_BACKGROUND, HAIR_OVER_PERSON = 0.3, 0.6
 """Least share of hair in a hair pixel. Light from behind makes a wisp before a backdrop look
 thinner than it is; the shadow of hair on skin makes it look thicker."""

@@ -13,7 +13,6 @@ from hairkit.parallel import compiled
 
 FAR = np.float32(1e6)
 """Distance of pixels that no seed reaches."""
-
 _STEPS = ((0, -1), (-1, -1), (-1, 0), (-1, 1))
 """(rows, columns) to the neighbours left, up left, up and up right, in the order of the costs."""
 

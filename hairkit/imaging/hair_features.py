@@ -19,35 +19,25 @@ from hairkit.arrays import BoolArray, Float32Array, Float64Array, UInt8Array
 
 GRID, CELL = 128, 5
 """Cells along the longer side of the photo, and pixels along a cell where texture is measured."""
-
 CHANNELS = 14
 """Number of features of a cell."""
-
 _LIGHTNESS, _CHROMA = 50.0, 30.0
 """Units of Lab that are one unit of a feature."""
-
 _DETAIL_SIGMA, _DETAIL_GAIN = 1.5, 4.0
 """Gaussian in pixels that fine detail is measured against, and its gain before the logarithm."""
-
 _TENSOR_SIGMA, _LEAST_ENERGY, _ENERGY_UNITS = 1.0, 0.05, 3.0
 """Gaussian in cells of the structure tensor, its trace in a flat region, and the number of units
 of the trace's logarithm that are one unit of a feature."""
-
 _SOBEL_SCALE = 1 / 8
 """Makes the difference of a 3 x 3 Sobel filter one per pixel."""
-
 _UNKNOWN = 0.5
 """Probability of the person where nothing is known about it."""
-
 _REACH = 2.0
 """Coordinates in the frame of the face saturate at about this many face lengths (eyes to mouth)."""
-
 _FADE = 32.0
 """Square of face lengths at which these coordinates have faded to 1 / e."""
-
 EYES, MOUTH = slice(36, 48), slice(48, 68)
 """iBUG landmarks of the eyes and of the mouth."""
-
 _CHEEKS = (36, 45, 54, 48)
 """Corners of the region whose median colour is that of the skin: of the eyes and of the mouth."""
 

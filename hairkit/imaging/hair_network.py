@@ -33,8 +33,6 @@ Weights = dict[str, Float32Array]
 MIRRORED = (5, 9)
 """Features that change their sign in a mirrored photo: the strands' slope and the coordinate across
 the face."""
-
-
 _REMEMBERED = 36
 """Answers that are remembered: those of the largest capture; each takes 0.2 MB."""
 _ANSWERS: dict[bytes, Float32Array] = {}

@@ -23,40 +23,28 @@ REDUCED_HEIGHT = 360
 """Rows of the picture that is labelled first; edges are then refined at full size."""
 REFERENCE_HEIGHT = 1080
 """Rows of the picture that options in pixels refer to; `picture_scale` converts them."""
-
 _LOG_FLOOR = 0.15
 """Added to brightness before its logarithm, as a share of the mean: keeps noise in shadows low."""
-
 _LEAST_CONTRAST = 0.25
 """Local deviation, as a share of the mean one, below which contrast is not amplified further."""
-
 _MOST_CONTRAST = 3.0
 """Local deviations at which contrast is clipped, so that highlights do not dominate."""
-
 _SURROUNDED = 0.9
 """Share of a pixel's surroundings on the mask from which it lies well inside."""
-
 _GREY_LEVEL = 1 / 255
 """One step of an 8-bit image."""
-
 _NO_WEIGHT = 1e-6
 """Share of a kernel on the mask below which its mean is rounding noise, and taken as 0."""
-
 _FILL_WEIGHT = 1e-3
 """Share of a kernel on the mask from which its mean fills a pixel outside the mask."""
-
 _FILL_PASSES = 2
 """Kernels, each twice as wide as the last, that fill the outside of a mask."""
-
 _WIDE_SIGMA = 4.0
 """Pixels; Gaussians wider than this are computed at half the size."""
-
 _HALVING_VARIANCE = 1.0
 """Square pixels that averaging 2 x 2 pixels and interpolating back add to a Gaussian."""
-
 COHERENT_WINDOW = 9
 """Edge in pixels of the box in which a true orientation has to be coherent to be scored."""
-
 COHERENT_RESULTANT = 0.85
 """Least mean resultant of the double angles in that box."""
 

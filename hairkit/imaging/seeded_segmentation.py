@@ -27,43 +27,31 @@ from hairkit.types.mask import BACKGROUND, HAIR, PERSON
 
 UNKNOWN = 64
 """Value of seed images where nothing is known."""
-
 _SAMPLES = 1500
 """Pixels at most from which a class's mixture is learnt; k-means takes time linear in them."""
-
 _MIN_CLUSTER = 10
 """Pixels of the smallest cluster that becomes a component."""
-
 _RIDGE = 0.05
 """Added to a component's variances, as a share of each feature's variance in the picture."""
-
 _KMEANS_ROUNDS, _KMEANS_STILL = 10, 0.1
 """Iterations of k-means at most, and the move of the centres (deviations) at which it ends."""
-
 _COST_PER_PIXEL, _COST_PER_CONTRAST = 0.02, 0.25
 """Geodesic cost of one pixel's step, and of a difference of one in Lab along it."""
-
 _DENOISE_SIGMA = 1.0
 """Gaussian in pixels before contrasts are measured, and after probabilities are."""
-
 _SMOOTH_SIGMA = 2.0
 """Gaussian in pixels of the mean colour and of the deviation of lightness."""
-
 _DETAIL_SIGMA, _DETAIL_GAIN = 1.5, 4.0
 """Gaussian in pixels that fine detail is measured against, and by which it is then averaged; gain
 of the detail before its logarithm, which brings hair's few grey levels to about the range of the
 other features."""
-
 _LEAST_DEVIATION = 1e-3
 """Added to a feature's deviation, so that a feature that is constant in the picture counts as 0."""
-
 _CERTAIN, _CERTAIN_WINDOW = 0.95, 5
 """Least probability of pixels from which the mixtures are learnt again, and the edge in pixels of
 the square that has to have one label around them."""
-
 THINNED = np.s_[::2, ::2]
 """Pixels of the reduced picture by which mixtures beside a prior are learnt again."""
-
 _ORDER = (HAIR, PERSON, BACKGROUND)
 """Classes of the channels of a probability."""
 _SURE, _FEWEST, _LEAST_PROBABILITY = 0.85, 30, 1e-4

@@ -49,22 +49,17 @@ TURN = {
 
 TOP_DEG = 60.0
 """Elevation of the view `top`, which may be added to the turn: from the front, looking down."""
-
 NAMES = (*TURN, "top")
 """Names by which photos tell what they show."""
-
 FEWEST, MOST = 1, 36
 """Numbers of photos: one is continued to where it shows nothing, and more than one every 10 degrees
 add nothing."""
-
 EDITS = "edits.json"
 """File of a capture with strokes of brushes, see `hairkit.grooming.brushes`."""
 BESIDE = ("landmarks.json", "capture.toml", EDITS)
 """Files of a capture that belong to no single photo."""
-
 WORKING_EDGE = 1440
 """Long edge in pixels that photos are scaled down to."""
-
 _PHOTO_SUFFIXES = (".jpg", ".jpeg", ".png", ".webp", ".tif", ".tiff", ".heic", ".heif")
 _OTHER_SUFFIXES = (".bmp", ".gif", ".dng", ".avif", ".jxl", ".cr2", ".cr3", ".nef", ".arw")
 _LANDMARKS = 68

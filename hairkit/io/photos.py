@@ -32,19 +32,14 @@ from hairkit.storage import read_bytes
 
 MAX_PIXELS = 64_000_000
 """Pictures with more pixels than this are refused before they are decoded."""
-
 MAX_BYTES = 256 * 2**20
 """Files larger than this are refused unread."""
-
 PHOTO_KINDS = ("JPEG", "PNG", "WebP", "TIFF", "HEIC")
 """Kinds of pictures that are read."""
-
 PHOTOS_TAKEN = f"a {', '.join(PHOTO_KINDS[:-1])} or {PHOTO_KINDS[-1]} photo"
 """The same as words of a message."""
-
 FILM_DIAGONAL_MM = math.hypot(36.0, 24.0)
 """Diagonal of the 35 mm film frame, to which equivalent focal lengths refer (CIPA DCG-001)."""
-
 _CROPPED = 0.02
 """Relative change of the aspect ratio since the picture was taken; more means it was cropped."""
 _KINDS = {

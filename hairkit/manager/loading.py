@@ -29,7 +29,6 @@ from hairkit.stages import OF_HOOK
 ENTRY_POINT_GROUP = "hairkit"
 DISABLE_AUTOLOAD = "HAIRKIT_DISABLE_PLUGIN_AUTOLOAD"
 """Environment variable: when it is set, only the plugins that ship with hairkit are loaded."""
-
 OPTION_TYPES = (bool, int, float, str, Path)
 """Types of options; tuples of these and any of these or None are options, too."""
 NO_PLUGIN = "none"

@@ -29,12 +29,10 @@ from hairkit.storage import open_file, read_bytes, write_bytes
 
 DOWNLOAD_LIMIT_S = 600.0
 """Seconds that a download may take: 35 MB at 60 kB/s."""
-
 NPM, NPM_VARIABLE = "https://registry.npmjs.org", "npm_config_registry"
 """The registry of npm, and npm's environment variable that names another."""
 ANSWER_LIMIT_S = 30.0
 """Seconds that the registry may take to answer, and between two pieces of its answer."""
-
 WHEEL, PACKAGES = ".whl", (".whl", ".tgz")
 """Ends of the names of packages: of the Python index, and with npm's."""
 _DAMAGE = (

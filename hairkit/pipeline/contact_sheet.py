@@ -62,7 +62,6 @@ EXPOSURE = 0.68
 """Factor of all light in these pictures."""
 LOOK = SkinLook(mean_free_path=(0.0, 0.0, 0.0))
 """Skin that scatters no light sideways: a pixel is as wide as light goes in the flesh."""
-
 PAPER, INK = 250, 60
 _HAIR_TINT, _PERSON_TINT = (232, 60, 132), (70, 130, 235)
 _HAIR_OPACITY, _PERSON_OPACITY = 0.6, 0.35

@@ -43,8 +43,6 @@ LOCK, LEAST_LOCK, LOCK_SHARE, USUAL_GUIDES = 0.01, 0.004, 0.25, 600
 """Radius in metres of the lock that a guide stands for, where there are so many guides; fewer stand
 for wider ones. Within 4 cm of the head's outline locks have this share of the distance from it, but
 are not thinner than outlines are off: hair of 12 mm that lacks its outer 5 mm is bare there."""
-
-
 COHERENT = 0.28
 """Coherence from which a photo tells a direction that any orienter finds: 0.34 to 0.58 in the
 median of captures of straight and wavy hair, 0.14 to 0.16 of coils and curls."""

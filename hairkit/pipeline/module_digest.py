@@ -25,7 +25,6 @@ from hairkit.storage import file_state
 
 FRONT_DOOR = "hairkit"
 """This package loads its names lazily: each stands for the module that defines it."""
-
 _STATEMENT = re.compile(
     r"(?:^|[:;])[ \t]*(?:from[ \t]+(\.*)[ \t]*([\w.]*)[ \t]+import\b[ \t]*(\([^)]*\)|[^#;\n]+)"
     r"|import[ \t]+([^#;\n]+))",

@@ -19,7 +19,6 @@ from hairkit.system import gl_backends, gl_cure
 
 REQUIRED_VERSION = 430
 """OpenGL 4.3, for compute shaders and storage buffers."""
-
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swr")
 """Words in the names of renderers that run on the CPU."""
 

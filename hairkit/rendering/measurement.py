@@ -25,7 +25,6 @@ HEAD_PUSH = 0.002
 """Meshes are drawn this far behind their surface, metres, so that they never hide roots."""
 SEEN_TOLERANCE = 0.001
 """A point up to this far behind the front strand of its pixel is visible, metres."""
-
 _NOTHING, _HAIR, _SOLID = (0.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0)
 
 

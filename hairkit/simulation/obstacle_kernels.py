@@ -22,8 +22,6 @@ DIAGONAL = 1.8
 """Cells; bound of the change of distance within a cell."""
 PUSHES = 3
 """Times that a drawn point is pushed out: keeping its length moves it again."""
-
-
 WORTH = 4096
 """Points that are worth another thread's while."""
 

@@ -36,7 +36,6 @@ FRINGE_SHARE, FRINGE_DEPTH = 0.5, 0.02
 foremost, metres."""
 MOST_STEPS = 120
 """Of a strand on the scalp."""
-
 _DOWN = np.array([0.0, -1.0, 0.0])
 
 

@@ -128,7 +128,6 @@ FRINGE_LENGTH = 0.10
 """Length of the loose strands over the forehead of tied hair, metres."""
 TIP_LIGHTNESS = 1.25
 """Reflectance at the tips over that at the roots."""
-
 _DOWN = np.array([0, -1, 0], np.float32)
 _LEVEL = np.array([1, 0, 1], np.float32)
 

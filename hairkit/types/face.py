@@ -15,7 +15,6 @@ from hairkit.types.head import LANDMARKS
 SURE_PRESENCE, SURE_YAW_DEG = 0.95, 55.0
 """Least presence and largest yaw of a face to be relied on: four of 18 rendered profiles were found
 as faces with presence 0.87 to 1.00 and yaw 39 to 62 degrees instead of 82 to 96."""
-
 STEEP_YAW_DEG = 47.0
 """Yaw from which landmarks are off by 5 mm and more: it is found in faces seen from 52 degrees."""
 

@@ -11,7 +11,6 @@ from hairkit.storage import Stored
 CURLY_SLOPE = 1.1
 """Slope of helices from which 2D orientations do not tell the axis: their mean doubled angle falls
 from 1 for straight hair through 0 at a slope of 1.5."""
-
 COIL_RADIUS = 0.0055
 """Radius of the widest tight coils, metres: those of type 4 hair are 2 to 5 mm."""
 

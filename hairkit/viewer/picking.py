@@ -18,7 +18,6 @@ LOCK_RADIUS = 0.02
 """Strands within this distance of the picked point belong to the lock, metres."""
 DEPTH_PER_PIXEL = 1e-3
 """Metres of depth that a pixel of distance from the mouse counts for, so that the front wins."""
-
 PARTS = 8
 """Parts of the segment between two points whose ends are looked at: guides have few points."""
 

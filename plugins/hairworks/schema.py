@@ -26,7 +26,6 @@ INFO_FIELDS = ("fileVersion", "toolVersion", "sourcePath", "authorName", "lastMo
 
 UNSET_TEXTURES = ("rootWidthTexture", "tipWidthTexture", "clumpNoiseTexture")
 """Textures that NVIDIA's files mark `null`."""
-
 TEXTURES = (
     "densityTexture",
     "rootColorTexture",
@@ -48,16 +47,13 @@ TEXTURES = (
 
 COMPONENTS = {"U8": 1, "U32": 1, "I32": 1, "F32": 1, "Vec2": 2, "Vec3": 3, "Vec4": 4, "Mat44": 16}
 """Numbers in one element of each type."""
-
 SPHERE_ELEMENTS = "boneSphereIndex(I32),boneSphereRadius(F32),boneSphereLocalPos(Vec3)"
 SPHERE_NUMBERS = 5
 
 MATERIALS = 4
 """HairWorks fills four slots whether the file has them or not, and writes past its array if not."""
-
 HAIRS_PER_FACE = 64
 """Hairs on each face of the growth mesh at density 1."""
-
 MAX_STRING = 127
 
 

@@ -32,8 +32,6 @@ DISTINCT_MOMENT = 0.02
 sides; that of bald men does not."""
 SIDE_SHARE, SIDE_MOMENT = 0.55, 0.5
 """Photos of the side show at least these shares of the front's skin and of its largest moment."""
-
-
 CLOTHES_APART, CLOTHES_RATIO, CLOTHES_NOISE = 0.2, 4.5, 0.03
 """Two groups of photos show two people if their clothes differ by the first in log chromaticity,
 and by the second times the spread within the groups plus the third. The ratio is 0.4 to 2.1 in nine

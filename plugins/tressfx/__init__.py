@@ -41,7 +41,6 @@ __all__ = ["FORMAT", "Options", "TfxHair", "bone_bytes", "read_binary", "read_te
 
 POINTS = (4, 8, 16, 32, 64)
 """Points of every strand that TressFX's threads can share out."""
-
 FORMAT = FileFormat(
     "TressFX",
     (".tfx",),

@@ -18,7 +18,6 @@ from .binary import HEADER, VERSION
 
 FIXED = 2
 """Points at the root that do not move."""
-
 INFLUENCES = 4
 STRAND = np.dtype([("strand", "<i4"), ("pairs", [("bone", "<i4"), ("weight", "<f4")], INFLUENCES)])
 

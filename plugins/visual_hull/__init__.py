@@ -66,7 +66,6 @@ SHELL_CELLS = 2
 """Thickness of the shell over the scalp, in cells."""
 SCALP_REACH_CELLS = 3
 """Cells from the scalp's vertices within which the shell lies: they are up to 8 mm apart."""
-
 FINEST = 0.0015
 """Metres of the smallest cell: hair 55 cm wide and deep and 70 cm long then fits into a grid, so
 that an allowed size is not refused when the cameras are found."""

@@ -6,7 +6,6 @@ from typing import Any
 
 SHIFT, CONTROL = 0x1, 0x2
 """GLFW's modifier bits."""
-
 SPECIAL = (
     "SPACE",
     "PERIOD",
