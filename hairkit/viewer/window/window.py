@@ -299,8 +299,7 @@ class Window:
     def _write_text(self) -> None:
         readings = replace(self.preview.readings, fps=1 / max(self._pace, 1e-6))
         image = overlay(self.session.size, self.session, readings)
-        if image is None:
-            image = np.zeros((1, 1, 4), np.uint8)
+        image = np.zeros((1, 1, 4), np.uint8) if image is None else image
         size = (image.shape[1], image.shape[0])
         if self._text.size != size:
             self._text.release()
