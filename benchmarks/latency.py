@@ -6,13 +6,15 @@ python benchmarks/latency.py --only viewer
 The studio is used by headless Chromium, which draws the hair on the same processor: a stroke or a
 slider is moved by mouse and keys while nothing else is going on, and the seconds end when the page
 shows what came of it. Pages draw what is found for the hair on the page *Hair*. Processor seconds
-are those of the studio's processes. The viewer's row is the whole life of `hairkit view` that is
-told to quit after its first picture, on a screen of its own (Xvfb).
+are those of the studio's processes. The viewer's rows are the whole life of `hairkit view` that
+ends once it has shown its first picture, of guides, or its second, of all hair, on a screen of its
+own (Xvfb).
 """
 
 from __future__ import annotations
 
 import argparse
+import itertools
 import os
 import resource
 import shutil
@@ -38,11 +40,17 @@ BROWSER = [
     "--no-sandbox", "--disable-quic", "--no-first-run", "--use-angle=swiftshader",
     "--enable-unsafe-swiftshader", "--disable-background-networking",
 ]  # fmt: skip
-ON_GPU = (
-    "import sys; from hairkit.__main__ import main; from hairkit.rendering.context import Renderer;"
-    "Renderer.software = False; sys.exit(main())"
+START = (
+    "import os, sys; from hairkit.__main__ import main;"
+    "from hairkit.rendering.context import Renderer;"
+    "from hairkit.viewer.window.window import Window;"
+    "show, left = Window.show_hidden, [{pictures}];"
+    "Renderer.software = Renderer.software and {soft};"
+    "Window.show_hidden = lambda self: (show(self), left.pop(), left or os._exit(0));"
+    "sys.exit(main())"
 )
-"""The viewer as on a graphics card: the shaders draw the hair, here by a software renderer."""
+"""The viewer, which ends as soon as some pictures are on the screen; unless `soft` the shaders draw
+the hair, as on a graphics card, here by a software renderer."""
 NEW_HAIR = """before => {
   const stage = document.querySelector('#hair[data-frames]');
   return stage && stage !== window.oldStage && window.shownHair !== before;
@@ -264,18 +272,16 @@ ACTS: dict[str, Callable[[Hand, int], None]] = {
 
 
 def _measure_viewer(groom: Path, repeats: int) -> None:
-    script = groom.with_name("quit.toml")
-    script.write_text('[[steps]]\ndo = "leave"\n')
-    words = ["view", str(groom), "--script", str(script), "--size", "1280x720"]
+    words = ["view", str(groom), "--size", "1280x720"]
+    seen = {"guides": "0", "all hair": "0, 0"}
     print("\n| viewer, 10,000 hairs, 1280 x 720 | s | processor s |\n|---|---|---|")
     with _screen() as screen:
-        for what, start in {"processor": ["-m", "hairkit"], "shaders": ["-c", ON_GPU]}.items():
-            command = [sys.executable, *start, *words]
-            taken = [_run(command, screen) for _ in range(repeats + 1)][
-                1:
-            ]  # the first one compiles
-            clock, busy = (statistics.median(column) for column in zip(*taken, strict=True))
-            print(f"| first picture, hair by {what} | {clock:.2f} | {busy:.2f} |", flush=True)
+        for (what, pictures), soft in itertools.product(seen.items(), (True, False)):
+            command = [sys.executable, "-c", START.format(pictures=pictures, soft=soft), *words]
+            runs = [_run(command, screen) for _ in range(repeats + 1)]  # the first one compiles
+            clock, busy = (statistics.median(column) for column in zip(*runs[1:], strict=True))
+            drawn = "processor" if soft else "shaders"
+            print(f"| {what}, by {drawn} | {clock:.2f} | {busy:.2f} |", flush=True)
 
 
 @contextmanager

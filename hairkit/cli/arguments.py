@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -12,6 +13,8 @@ Add = Callable[..., Any]
 
 GUIDES = 600
 """Roots by default, as of `hairkit.reconstruct`."""
+LARGEST = 8192
+"""Longest edge of a picture, pixels."""
 LARGEST_SEED = 2**63 - 1
 _REPEATED: dict[str, Any] = {"action": "append", "default": []}
 _FLAG = {"action": "store_true"}
@@ -49,3 +52,11 @@ def check_range(name: str, value: float | None, low: float, high: float, unit: s
     """Raise `InputError` for a value outside a range; None is one that was not given."""
     if value is not None and not low <= value <= high:
         raise InputError(f"{name} is {value}, expected {low} to {high}{unit and f' {unit}'}")
+
+
+def parse_size(text: str) -> tuple[int, int]:
+    """Return width and height of `WIDTHxHEIGHT`."""
+    match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text)
+    if not match or not all(1 <= int(n) <= LARGEST for n in match.groups()):
+        raise InputError(f"--size is {text!r}, expected WIDTHxHEIGHT up to {LARGEST}, as 1280x720")
+    return int(match[1]), int(match[2])

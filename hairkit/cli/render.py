@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import re
 import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from hairkit.cli.arguments import Add, add_shared, check_range
+from hairkit.cli.arguments import Add, add_shared, check_range, parse_size
 from hairkit.cli.settings import importer_of, split_settings
 from hairkit.cli.written import check_target, print_written
 from hairkit.errors import InputError
@@ -43,8 +42,6 @@ HAIRS = 20_000
 MOST_HAIRS = 200_000
 MOST_PICTURES = 3600
 """Of a turntable: ten a degree."""
-LARGEST = 8192
-"""Longest edge of a picture, pixels."""
 
 
 def add_arguments(add: Add) -> None:
@@ -145,14 +142,6 @@ def _direction(text: str) -> tuple[float, float]:
     if not (np.isfinite(azimuth) and abs(elevation) < 90):
         raise InputError(f"--camera is {text!r}, expected an elevation between -90 and 90 degrees")
     return azimuth, elevation
-
-
-def parse_size(text: str) -> tuple[int, int]:
-    """Return width and height of `WIDTHxHEIGHT`."""
-    match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", text)
-    if not match or not all(1 <= int(n) <= LARGEST for n in match.groups()):
-        raise InputError(f"--size is {text!r}, expected WIDTHxHEIGHT up to {LARGEST}, as 1280x720")
-    return int(match[1]), int(match[2])
 
 
 def _paths(output: Path, count: int) -> list[Path]:

@@ -6,8 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from hairkit.cli.arguments import LARGEST_SEED, Add, add_shared, check_range
-from hairkit.cli.render import parse_size
+from hairkit.cli.arguments import LARGEST_SEED, Add, add_shared, check_range, parse_size
 from hairkit.cli.written import print_written
 from hairkit.head_model.template import default_head
 from hairkit.synth import STYLES, grow, photograph

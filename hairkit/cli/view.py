@@ -8,8 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any, NoReturn
 
-from hairkit.cli.arguments import Add, add_shared, check_range
-from hairkit.cli.render import parse_size
+from hairkit.cli.arguments import Add, add_shared, check_range, parse_size
 from hairkit.cli.written import print_written
 from hairkit.errors import InputError
 
@@ -156,6 +155,7 @@ def _session(args: argparse.Namespace, manager: Any, size: tuple[int, int], seed
         capture=args.capture,
         seed=seed,
         reading=settings["reader"],
+        guides_first=not args.headless,
     )
     if args.preset is not None:
         perform(session, "preset_load", {"name": args.preset})

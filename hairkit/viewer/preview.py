@@ -158,10 +158,8 @@ class Preview:
         rows = session.guide_rows()
         look = self._look(quality.smooth, quality.share, sample=quality is SAMPLE)
         overlays = self._overlays(rows)
-        billboards, solids = (
-            self._load_billboards(frame_renderer),
-            self._load_solids(frame_renderer),
-        )
+        billboards = self._load_billboards(frame_renderer)
+        solids = self._load_solids(frame_renderer)
         frame_renderer.draw(
             FrameInputs(
                 camera,

@@ -108,8 +108,12 @@ class Session:
         capture: str | None = None,
         seed: int = 0,
         reading: Mapping[str, object] | None = None,
+        guides_first: bool = False,
     ) -> None:
-        """Open `path`; `reading` are options of the plugin that imports it."""
+        """Open `path`; `reading` are options of the plugin that imports it.
+
+        If `guides_first`, there is no hair between the guides until `fill_in`.
+        """
         self.manager = manager
         self.size = size
         self._simulator = simulator
@@ -141,6 +145,7 @@ class Session:
         self.overwrite = False
         """True overwrites existing screenshots and recordings."""
         self.finished = False
+        self._unfilled = guides_first
         self.open(path)
 
     def open(self, path: Path) -> None:
@@ -156,7 +161,7 @@ class Session:
     def _retake(self, opened: Opened) -> None:
         values = dict(self.simulation.values)
         self._take(opened)
-        if self.simulation.infos:
+        if values:
             self.simulation.replace(values)
 
     def take_brush(self, name: str) -> None:
@@ -274,7 +279,7 @@ class Session:
         if self.brushing and len(shown := self.brushing.rows) == len(self.body.guides):
             return shown.astype(np.float32)
         matrix = self.world_from_head.astype(np.float32)
-        rows = self.simulation.simulator.points.reshape(-1, len(self._shares), 3)
+        rows = self.simulation.points.reshape(-1, len(self._shares), 3)
         return np.asarray((rows - matrix[:3, 3]) @ matrix[:3, :3], np.float32)
 
     def measures(self) -> Measures:
@@ -300,8 +305,13 @@ class Session:
         self.steps, self._time_debt = 0, 0.0
         self._make_body()
 
+    def fill_in(self) -> None:
+        """Make the hair between the guides."""
+        self._unfilled = False
+        self._make_body()
+
     def _make_body(self) -> None:
-        hairs = max(self.shown.hairs, len(self._guides.strands))
+        hairs = max(0 if self._unfilled else self.shown.hairs, len(self._guides.strands))
         self.body = HairBody.of(self._guides, hairs, self._own, self.seed, self._shares)
 
 

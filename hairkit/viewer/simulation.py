@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -70,15 +71,23 @@ class TunableSimulator:
         plugin = default_simulator(manager) if plugin is None else plugin
         if plugin not in (*names, NO_SIMULATOR):
             raise InputError(unknown_name("simulator", plugin, [*names, NO_SIMULATOR]))
-        self._manager = manager
+        self._manager, self._groom = manager, groom
         self.plugin = plugin
         self.values: dict[str, Any] = {}
         """Values of the options that differ from their defaults."""
-        self.simulator: Simulator = (
-            RigidHair(groom)
-            if plugin == NO_SIMULATOR
-            else manager.call("make_simulator", plugin, None, groom=groom)
-        )
+
+    @cached_property
+    def simulator(self) -> Simulator:
+        """The simulator, made when it is first asked for."""
+        if self.plugin == NO_SIMULATOR:
+            return RigidHair(self._groom)
+        made: Simulator = self._manager.call("make_simulator", self.plugin, None, groom=self._groom)
+        return made
+
+    @property
+    def points(self) -> Float32Array:
+        """(P, 3) present positions, world, metres: those at rest until there is a simulator."""
+        return self.simulator.points if "simulator" in vars(self) else self._groom.strands.points
 
     @property
     def infos(self) -> tuple[OptionInfo, ...]:

@@ -169,3 +169,29 @@ def test_a_broken_shader_leaves_the_picture_as_it_was(
         assert (preview.picture() == before).all()
         assert gl.program("viewer_screen", "viewer_studio") is not program
         preview.release()
+
+
+def test_the_first_picture_needs_neither_simulator_nor_hair_between_guides(
+    swaying_manager: Manager, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Guides are drawn first; all hair, which comes then, is as if it had been made at once."""
+    path = tmp_path / "groom.npz"
+    bristle_groom().save(path)
+    made: list[object] = []
+    call = Manager.call
+    monkeypatch.setattr(Manager, "call", lambda *a, **k: (made.append(a[1]), call(*a, **k))[1])
+    first = Session(swaying_manager, path, size=(160, 120), hairs=200, guides_first=True)
+    assert len(first.body) == len(first.body.guides)
+    with renderer() as gl:
+        preview = Preview(gl, first)
+        preview.draw()
+        first.fill_in()
+        preview.draw()
+        preview.release()
+    assert "make_simulator" not in made
+    whole = Session(swaying_manager, path, size=(160, 120), hairs=200)
+    np.testing.assert_array_equal(first.body.edges, whole.body.edges)
+    np.testing.assert_array_equal(first.guide_rows(), whole.guide_rows())
+    rows = first.guide_rows()
+    assert len(first.simulation.simulator.points) == rows.size // 3
+    np.testing.assert_allclose(first.guide_rows(), rows, atol=1e-6)

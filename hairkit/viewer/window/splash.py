@@ -46,7 +46,7 @@ class WaitScreen:
     def run(self, title: str, work: Callable[[], _Made], *, draws: bool = False) -> _Made:
         """Return the result of `work`; show the title and the elapsed seconds meanwhile.
 
-        If `draws`, the work holds the OpenGL context, and only the window's title is updated.
+        If `draws`, the work may hold the OpenGL context: only the window's title is updated.
 
         Raises
         ------
@@ -63,7 +63,8 @@ class WaitScreen:
                 failed.append(error)
 
         try:
-            self._show(title, 0)
+            if not draws:
+                self._show(title, 0)
             thread = threading.Thread(target=try_work, daemon=True)
             thread.start()
             self._wait(thread, title, draws)

@@ -21,7 +21,7 @@ class Stillness:
     def __init__(self, session: Session, now: float) -> None:
         self._session = session
         self._stirred = self._looked = now
-        self._seen: Float32Array = session.simulation.simulator.points
+        self._seen: Float32Array = session.simulation.points
         self._resting = False
 
     def stir(self, now: float) -> None:
@@ -41,7 +41,7 @@ class Stillness:
     def _look(self, now: float) -> None:
         """Find whether head, air and hair are at rest since the last look."""
         session, before = self._session, self._seen
-        self._seen = points = session.simulation.simulator.points
+        self._seen = points = session.simulation.points
         self._looked = now
         driven = session.wind.blowing or session.grabbed_lock is not None or session.motion.shakes
         moved = before.shape != points.shape

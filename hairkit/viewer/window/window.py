@@ -109,12 +109,17 @@ def _start_window(
     size: tuple[int, int],
     budget: float,
 ) -> Window:
-    """Return the window with its first picture drawn but not shown."""
+    """Return the window; it shows guides first, then all hair, then the simulator is made."""
     waiting = WaitScreen(context.glfw, context.window)
     session = waiting.run("opening the groom", lambda: make_session(size))
-    waiting.run("compiling the simulator", lambda: warm_up(session))
     window = Window(context, session, budget)
-    waiting.run("drawing the first picture", window.draw_hidden, draws=True)
+    waiting.run("drawing guides", window.draw_hidden, draws=True)
+    window.show_hidden()
+    waiting.run("making hair between the guides", session.fill_in, draws=True)
+    waiting.run("drawing all hair", window.draw_hidden, draws=True)
+    window.show_hidden()
+    waiting.run("compiling the simulator", lambda: warm_up(session), draws=True)
+    window.listen()
     return window
 
 
@@ -148,7 +153,6 @@ class Window:
         self._stillness = Stillness(session, time.monotonic())
         self._warnings = _Warnings(session)
         logging.getLogger("hairkit").addHandler(self._warnings)
-        self._listen()
         session.message = session.message or "press H for the keys"
 
     def perform(self, name: str, values: Mapping[str, object]) -> None:
@@ -219,6 +223,13 @@ class Window:
         with renderer():
             self.preview.draw()
 
+    def show_hidden(self) -> None:
+        """Show the picture drawn last, without the panel, which may ask for the simulator."""
+        with renderer() as gl:
+            self._show(gl)
+            self._glfw.swap_buffers(self._window)
+            gl.home.use()
+
     def picture(self, seconds: float) -> None:
         """Simulate `seconds` and show a picture."""
         began = time.perf_counter()
@@ -288,8 +299,7 @@ class Window:
     def _write_text(self) -> None:
         readings = replace(self.preview.readings, fps=1 / max(self._pace, 1e-6))
         image = overlay(self.session.size, self.session, readings)
-        if image is None:
-            image = np.zeros((1, 1, 4), np.uint8)
+        image = np.zeros((1, 1, 4), np.uint8) if image is None else image
         size = (image.shape[1], image.shape[0])
         if self._text.size != size:
             self._text.release()
@@ -322,7 +332,8 @@ class Window:
             except RenderError as error:  # for example a half-edited shader: retry at the next save
                 self.session.message = one_line(error)
 
-    def _listen(self) -> None:
+    def listen(self) -> None:
+        """Take mouse and keys."""
         glfw, window = self._glfw, self._window
         glfw.set_key_callback(window, self.on_key)
         glfw.set_mouse_button_callback(window, self.on_button)
