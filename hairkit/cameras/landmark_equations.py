@@ -17,7 +17,7 @@ from scipy.sparse import csr_matrix
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
 from hairkit.head_model.cranium import Cranium
 from hairkit.types.capture import Capture, View
-from hairkit.types.face import STEEP_YAW_DEG
+from hairkit.types.face import OBLIQUE_YAW_DEG, STEEP_YAW_DEG
 from hairkit.types.head import JAW_LANDMARKS, LANDMARKS
 from hairkit.types.mask import HAIR, Mask
 
@@ -26,7 +26,7 @@ JAW_NOISE, COVERED_NOISE = 2.0, 3.0
 FACES = 4
 """Views that show the face in a turn of eight, at most."""
 UNLIKE_DEG = 8.0
-"""Difference up to which a face's yaw is that of the turn."""
+"""Difference up to which an oblique face's yaw is that of the turn."""
 STEEP = 1.0
 """Growth of the noise of a steep face's landmarks for each degree of its yaw. A mesh hardly turns
 farther: faces seen from 52, 58, 65 and 70 degrees have yaws of 47, 50, 51 and 52, some seen from 62
@@ -50,11 +50,12 @@ above let it vary by 3.6 %. Cameras pull it, too, all one way: with 0.02 the sca
 def steepness(views: Sequence[View]) -> Float64Array:
     """Return by how many degrees (V,) faces are turned too far, 0 for the rest.
 
-    By their yaws, or beyond them, as the turn has it.
+    By their yaws, or those of oblique faces beyond them, as the turn has it.
     """
     faces = [(v.azimuth_deg, v.face.yaw_deg) if v.face else (0.0, 0.0) for v in views]
-    azimuth, yaw = np.array(faces).T
+    azimuth, yaw = np.reshape(faces, (-1, 2)).T
     beyond = 180 - np.abs((azimuth - yaw) % 360 - 180) - UNLIKE_DEG
+    beyond = np.where(np.abs(yaw) > OBLIQUE_YAW_DEG, beyond, 0.0)
     return np.asarray(np.maximum(np.abs(yaw) - STEEP_YAW_DEG, beyond).clip(0), np.float64)
 
 

@@ -15,8 +15,10 @@ from hairkit.types.head import LANDMARKS
 SURE_PRESENCE, SURE_YAW_DEG = 0.95, 55.0
 """Least presence and largest yaw of a face to be relied on: four of 18 rendered profiles were found
 as faces with presence 0.87 to 1.00 and yaw 39 to 62 degrees instead of 82 to 96."""
-STEEP_YAW_DEG = 47.0
-"""Yaw from which landmarks are off by 5 mm and more: it is found in faces seen from 52 degrees."""
+OBLIQUE_YAW_DEG, STEEP_YAW_DEG = 40.0, 47.0
+"""Yaws from which a face may be seen from farther aside, and from which its landmarks are surely
+off by 5 mm and more. Faces seen from 50 degrees were found with yaws of 41, from 62 to 69 with 44
+to 52, as were some from 41 to 49; profiles with 39 to 62."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,14 +15,12 @@ from typing import Self
 import numpy as np
 
 from hairkit.arrays import BoolArray, Float64Array, Int64Array
-from hairkit.types.face import Face
+from hairkit.types.face import OBLIQUE_YAW_DEG, Face
 
 YAW_DEG = 4.0
 """Standard deviation of the azimuth that a face tells."""
-OBLIQUE_DEG, OBLIQUE_GROWTH = 40.0, 3.0
-"""Yaw from which on faces may be seen from farther aside: the deviation to that side grows by this
-many degrees for each degree beyond. Faces seen from 50 degrees were found with yaws of 41, from 62
-to 69 with 44 to 52, as were some from 41 to 49; profiles with 39 to 62."""
+OBLIQUE_GROWTH = 3.0
+"""Growth of that deviation, away from the front, for each degree of an oblique face's yaw."""
 FACE_CAP = 30.0
 """Largest cost of one face: beyond 30 degrees off, farther is not worse."""
 HIDDEN_DEG, HIDDEN_SPREAD_DEG = 60.0, 10.0
@@ -89,7 +87,7 @@ class Evidence:
     ) -> Self:
         """Return the evidence of photos, of which no names are known."""
         yaw = np.array([face.yaw_deg if face.sure else np.nan for face in faces])
-        beyond = np.maximum(np.abs(yaw) - OBLIQUE_DEG, 0)
+        beyond = np.maximum(np.abs(yaw) - OBLIQUE_YAW_DEG, 0)
         faint = [not face.sure and face.presence > FAINT_PRESENCE for face in faces]
         side = np.where(faint, np.sign([face.yaw_deg for face in faces]), 0.0)
         alike, mirrored = outlines if outlines is not None else (None, None)

@@ -82,8 +82,10 @@ def test_steep_faces_count_less() -> None:
 
 
 def test_a_face_is_as_steep_as_the_turn_has_it() -> None:
-    """One seen from farther aside than it seems is hardly relied on: few are steep from 47 on."""
+    """An oblique one seen from farther aside is hardly relied on; others are."""
     assert steepness(faces_at((45, 48), (62, 45), (290, -44), (0, 0))).tolist() == [1, 9, 18, 0]
+    assert steepness(faces_at((30, 10), (180, 39))).tolist() == [0, 0]
+    assert len(steepness([])) == 0
     unseen = replace(faces_at((90, 0))[0], face=None)
     assert steepness([unseen]).tolist() == [0]
 
