@@ -157,7 +157,8 @@ def test_landmarks_that_are_not_trusted_hardly_count_as_misfit(bust: Turntable) 
             assert marks is not None
             marks = marks + wrong * np.random.default_rng(0).normal(0, 15, (68, 2))
             each = np.full(68, noise if wrong else 1.0)
-            face = Face(1.0, marks, each, views[i].azimuth_deg, 0.0, 0.0)
+            yaw = (views[i].azimuth_deg + 180) % 360 - 180
+            face = Face(1.0, marks, each, yaw, 0.0, 0.0)
             views[i] = replace(views[i], face=face, landmarks=marks)
         capture = replace(bust.capture, views=tuple(views))
         found = estimate_scene(
