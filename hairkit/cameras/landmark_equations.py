@@ -30,8 +30,8 @@ UNLIKE_DEG = 8.0
 STEEP = 1.0
 """Growth of the noise of a steep face's landmarks for each degree of its yaw. A mesh hardly turns
 farther: faces seen from 52, 58, 65 and 70 degrees have yaws of 47, 50, 51 and 52, some seen from 62
-of 44, and landmarks that are off by 5 to 12 mm, all of a face one way: many tell no more than one.
-"""
+of 44. Their landmarks are off by 5 to 12 mm, all of a face one way, so that many tell no more than
+one."""
 MIDLINE = np.array([27, 28, 29, 30, 33, 51, 57, 8])
 """Nose, lips and chin: they lie on the outline of a view from the side."""
 AFFINE_SPREAD, SMOOTH_SPREAD, SMOOTH_LENGTH = 0.004, 0.004, 0.04
