@@ -80,6 +80,9 @@ which one without a face is a profile, over the largest with one: nine rendered 
 CLOSE = 7
 """Photos from which neighbours are near enough to look alike: of 6 of a turn of eight, with gaps,
 more turns would be sure and wrong."""
+IN_ORDER = 4.0
+"""Logarithm of the odds that photos are given in the order of the turn, over any other order of as
+good evidence: most are, and a turn of eight has 2,520 orders."""
 NAMED_SPREAD = 1.0
 """Standard deviation of azimuths that the user names, degrees."""
 
@@ -93,7 +96,8 @@ def find_turn(capture: Capture, faces: tuple[Face, ...], persons: tuple[Person, 
     twins = find_copies(views, outlines)
     canonical = np.arange(len(views)) if _is_video(capture) else order_by_content(views)
     ordered = [views[i] for i in canonical]
-    arrangements = _find(ordered, [outlines[i] for i in canonical], _is_video(capture))
+    follow = np.inf if _is_video(capture) else IN_ORDER
+    arrangements = _find(ordered, [outlines[i] for i in canonical], canonical, follow)
     best, *others = (_tell(views, found, canonical, twins) for found in arrangements)
     return replace(best, others=tuple(others))
 
@@ -125,10 +129,16 @@ def order_by_content(views: Sequence[View]) -> Int64Array:
     return np.array(sorted(range(len(views)), key=lambda i: digests[i]), np.int64)
 
 
-def _find(views: Sequence[View], outlines: Sequence[Outline | None], in_time: bool) -> list[Found]:
+def _find(
+    views: Sequence[View],
+    outlines: Sequence[Outline | None],
+    sequence: Int64Array,
+    follow: float,
+) -> list[Found]:
     """Return from where the photos were taken: as their names say, if no face contradicts them.
 
-    Behind the likeliest arrangement come those that fit nearly as well.
+    `sequence` (V,) is the order in which they were given, `follow` the odds that they were taken
+    so. Behind the likeliest arrangement come those that fit nearly as well.
     """
     faces = [view.face or Face.absent() for view in views]
     azimuth = np.array([view.azimuth_deg for view in views])
@@ -153,7 +163,8 @@ def _find(views: Sequence[View], outlines: Sequence[Outline | None], in_time: bo
         try:
             if len(views) <= FEW and _are_profiles(seen):
                 raise NoBackError("no photo shows the back of the head")
-            found = _arrange(views, seen, named, in_time)
+            seen = replace(seen, sequence=sequence, follow=follow)
+            found = _arrange(views, seen, named)
         except NoBackError:
             found = [_by_faces(views, _with_profiles(seen), replace(read, named=named))]
     if wrong is not None:
@@ -209,14 +220,13 @@ def _by_faces(views: Sequence[View], evidence: Evidence, read: Found) -> Found:
     return replace(read, azimuth_deg=azimuth, elevation_deg=level, above=none)
 
 
-def _arrange(views: Sequence[View], seen: Evidence, named: BoolArray, in_time: bool) -> list[Found]:
+def _arrange(views: Sequence[View], seen: Evidence, named: BoolArray) -> list[Found]:
     """Return the best arrangements; views in `named` (V,) stay as they are said to be."""
     azimuth = np.array([view.azimuth_deg for view in views])
     evidence = replace(
         seen,
         yaw_deg=np.where(named, azimuth, seen.yaw_deg),
         spread_deg=np.where(named, NAMED_SPREAD, seen.spread_deg),
-        in_time=in_time,
     )
     elevation = np.array([view.elevation_deg for view in views])
     pitch = np.array([v.face.pitch_deg if v.face and v.face.sure else np.nan for v in views])

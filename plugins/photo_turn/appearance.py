@@ -13,6 +13,7 @@ import numpy as np
 
 from hairkit import View
 from hairkit.arrays import Float64Array, UInt8Array
+from hairkit.imaging.hair_network import find_hair
 from hairkit.imaging.person_outline import DEPTHS, Outline
 from hairkit.types.face import Face
 
@@ -42,9 +43,10 @@ FACE_POINTS = np.r_[17:68]
 """iBUG points whose hull is skin: all but the jaw, which may lie under hair."""
 EYES_AND_MOUTH = (np.r_[36:42], np.r_[42:48], np.r_[48:60])
 """iBUG points of what is no skin inside."""
-CLOTHES_BAND, CROWN_DEPTH = 0.08, 0.25
-"""Clothes are looked for in the lowest rows of the person, a share of the picture's height; hair is
-what lies above this depth below the crown, head widths."""
+CLOTHES_BAND, CLOTHES_DEPTH, CROWN_DEPTH = 0.08, 1.6, 0.25
+"""Clothes are looked for in the lowest rows of the person, a share of the picture's height, if these
+lie so many head widths below the crown: of some persons from behind hair alone is found. Hair is
+what lies above the last depth."""
 NOT_HAIR, CLOTHED = 0.18, 0.3
 """Clothes differ from hair by this much in log chromaticity, in at least this share of the band."""
 HEAD_PIXELS, LEAST_UNLIKE = 16, 0.05
@@ -200,6 +202,7 @@ def _skin_moments(
     off = _log_colour(small[rows, columns]) - usual
     squared = np.einsum("ni,ij,nj->n", off, precision, off)
     skin = np.exp(-squared / (2 * SKIN_WIDTH))
+    skin *= 1 - cv2.resize(find_hair(view)[..., 0], size)[rows, columns]
     if view.person is not None and view.person.hair.size:
         skin *= 1 - cv2.resize(view.person.hair, size)[rows, columns] / 255
     sideways = (columns - columns.mean()) / (outline.width_px * scale)
@@ -215,10 +218,11 @@ def measure_clothes(photos: Sequence[UInt8Array], outlines: Sequence[Outline]) -
         inside = cv2.resize(outline.inside.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
         rows, columns = np.nonzero(inside)
         colour = _log_colour(small[rows, columns])[:, :2]
-        crown = rows <= (outline.top_px + CROWN_DEPTH * outline.width_px) * scale
+        depth = (rows / scale - outline.top_px) / outline.width_px
+        crown = depth <= CROWN_DEPTH
         band = colour[rows >= rows.max() - CLOTHES_BAND * len(small)]
         off = np.linalg.norm(band - np.median(colour[crown], axis=0), axis=1)
-        clothed = (off > NOT_HAIR).mean() > CLOTHED
+        clothed = depth.max() > CLOTHES_DEPTH and (off > NOT_HAIR).mean() > CLOTHED
         found.append(np.median(band[off > NOT_HAIR], axis=0) if clothed else np.full(2, np.nan))
     return np.array(found)
 

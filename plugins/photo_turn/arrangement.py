@@ -28,7 +28,7 @@ HIDDEN_DEG, HIDDEN_SPREAD_DEG = 60.0, 10.0
 FAINT_PRESENCE = 0.3
 """Least presence of a face that tells the side of the head at least: eight photos of the sides,
 36 to 93 degrees from the front, had 0.47 to 0.6; none from behind had more than 0.1."""
-SIDE_DEG, SIDE_SPREAD_DEG, SIDE_CAP = 70.0, 18.0, 8.0
+SIDE_DEG, SIDE_SPREAD_DEG, SIDE_CAP = 70.0, 18.0, 4.0
 """Azimuth of such faces, its standard deviation, and their largest cost."""
 OUTLINE_WEIGHT = 60.0
 """Cost of outlines that differ by one more head width than usual. On nine captures the next best
@@ -73,8 +73,10 @@ class Evidence:
     """(V,) how unlike those of level photos the outlines are."""
     unlike: Float64Array | None = None
     """(V, V) how unlike heads look, 0 for a usual pair; None or NaN where unknown."""
-    in_time: bool = False
-    """True when the photos are in the order of time: frames of one video."""
+    sequence: Int64Array | None = None
+    """(V,) places of the photos in the order in which they were given, or None where that is unknown."""
+    follow: float = 0.0
+    """Logarithm of the odds that the turn follows this order; `inf` for frames of one video."""
 
     @classmethod
     def of(
@@ -108,6 +110,7 @@ class Evidence:
             skin=None if self.skin is None else self.skin[photos],
             odd=self.odd[photos],
             unlike=None if self.unlike is None else self.unlike[pairs],
+            sequence=None if self.sequence is None else self.sequence[photos].argsort().argsort(),
         )
 
     def off(self, azimuth_deg: Float64Array) -> tuple[Float64Array, Float64Array]:
@@ -178,7 +181,7 @@ def measure_cost(
     """
     angle = np.radians(azimuth_deg)
     across, ahead = np.sin(angle), np.cos(angle)
-    cost = _face_cost(azimuth_deg, evidence) + _step_cost(azimuth_deg, evidence.in_time)
+    cost = _face_cost(azimuth_deg, evidence) + _step_cost(azimuth_deg, evidence)
     cost += _outline_cost(across, ahead, evidence) if outlines is None else outlines
     cost += _skin_cost(across, ahead, evidence)
     return cost + _looks_cost(azimuth_deg, evidence)
@@ -195,15 +198,20 @@ def _face_cost(azimuth: Float64Array, evidence: Evidence) -> Float64Array:
     return np.asarray(cost + np.minimum(aside**2 / 2, SIDE_CAP).sum(axis=1), np.float64)
 
 
-def _step_cost(azimuth: Float64Array, in_time: bool) -> Float64Array:
-    """Return the cost of uneven steps: around the head, or from frame to frame either way."""
+def _step_cost(azimuth: Float64Array, evidence: Evidence) -> Float64Array:
+    """Return the cost of uneven steps: from photo to photo as they were given, either way, or
+    around the head. Either may be the order in which they were taken."""
     even = 360.0 / azimuth.shape[1]
-    if in_time:
-        steps = np.diff(azimuth, axis=1, append=azimuth[:, :1])
-        ways = [_uneven(wrap(way * steps - even)) for way in (1.0, -1.0)]
-        return np.minimum(*ways)
     around = np.sort(azimuth % 360.0, axis=1)
-    return _uneven(np.diff(around, axis=1, append=around[:, :1] + 360.0) - even)
+    cost = _uneven(np.diff(around, axis=1, append=around[:, :1] + 360.0) - even)
+    if evidence.sequence is None:
+        return cost
+    given = azimuth[:, evidence.sequence.argsort()]
+    steps = np.diff(given, axis=1, append=given[:, :1])
+    along = np.minimum(*(_uneven(wrap(way * steps - even)) for way in (1.0, -1.0)))
+    if np.isinf(evidence.follow):
+        return along
+    return np.asarray(-np.logaddexp(evidence.follow - along, -cost), np.float64)
 
 
 def _uneven(off_deg: Float64Array) -> Float64Array:

@@ -59,7 +59,7 @@ def find_arrangements(
     search = Search(evidence, photos, fixed[photos])
     found = search.run(STARTS)
     best = found[0].azimuth_deg
-    if len(photos) >= FEWEST_WITH_ABOVE and not evidence.in_time:
+    if len(photos) >= FEWEST_WITH_ABOVE and not np.isinf(evidence.follow):
         for photo in np.nonzero(~above & ~level & ~fixed)[0]:
             rest = photos[photos != photo]
             without = Search(evidence, rest, fixed[rest], ABOVE - float(evidence.odd[photo]))
@@ -114,11 +114,12 @@ class Search:
         """Return what is found from random orders, and from azimuths (R,) if given, by cost."""
         evidence = self.everything.only(self.photos)
         generator = np.random.default_rng(0)
-        if evidence.in_time:
-            first = [way * np.arange(len(self.photos)) for way in (1.0, -1.0)]
-            places = [_turned_to_faces(360.0 * row / len(row), evidence) for row in first]
-        else:
-            places = [_start(evidence, generator) for _ in range(starts)]
+        places = []
+        if evidence.sequence is not None:
+            even = 360.0 / len(self.photos) * evidence.sequence
+            places = [_turned_to_faces(way * even, evidence) for way in (1.0, -1.0)]
+        if not np.isinf(evidence.follow):
+            places += [_start(evidence, generator) for _ in range(starts)]
         if near is not None:
             places.append(near)
         found = [self._placed(self._settle(place, evidence)) for place in places]

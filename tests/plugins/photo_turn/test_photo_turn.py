@@ -9,7 +9,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from hairkit_plugins.photo_turn import find_turn
+from hairkit_plugins.photo_turn import IN_ORDER, appearance, find_turn
 from hairkit_plugins.photo_turn.arrangement import Evidence, Placed, wrap
 from hairkit_plugins.photo_turn.refuse import check_turn
 from hairkit_plugins.photo_turn.search import Search
@@ -145,6 +145,17 @@ def test_hair_of_the_colour_of_skin_is_hair() -> None:
     assert off(find(untold), shots).max() > off(find(sunny), shots).max()
 
 
+def test_hair_that_only_the_hair_network_finds_is_no_skin(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The network for persons may see nobody in a head from behind, and so no hair."""
+    shots = ring(EIGHT)
+    sunny = [in_the_sun(shot) for shot in shots]
+    hair = {shot.view.image.tobytes(): shot.person.hair[..., None] / 255 for shot in sunny}
+    want = find(sunny).azimuth_deg
+    untold = [replace(shot, person=Person(shot.person.alpha)) for shot in sunny]
+    monkeypatch.setattr(appearance, "find_hair", lambda view: hair[view.image.tobytes()])
+    assert np.abs(wrap(find(untold).azimuth_deg - want)).max() < 1
+
+
 def test_hair_taken_for_background_belongs_to_the_outline(monkeypatch: pytest.MonkeyPatch) -> None:
     """A head from behind of which the person's network sees the neck alone keeps its place."""
     shots = ring(CARELESS)
@@ -175,7 +186,7 @@ def test_shuffled_photos_are_sorted(azimuths: tuple[float, ...], seed: int) -> N
     found = find([shots[i] for i in moved])
     assert off(found, [shots[i] for i in moved]).max() < 25
     assert np.array_equal(found.azimuth_deg, want.azimuth_deg[moved])
-    assert found.margin == want.margin
+    assert found.margin < want.margin + 0.001  # nothing speaks for this order
 
 
 def test_a_speck_for_a_person_silences_one_photo_alone() -> None:
@@ -247,12 +258,28 @@ def test_a_photo_that_fits_nowhere_else_is_doubted() -> None:
 
 
 def test_a_tie_is_told() -> None:
-    """Where only faces are known, all other photos may change places: the margin is one."""
-    found = find([replace(s, person=Person.absent()) for s in ring(EIGHT)])
+    """Where only faces are known, shuffled photos may change places: the margin is one."""
+    shots = [replace(shot, person=Person.absent()) for shot in ring(EIGHT)]
+    found = find([shots[i] for i in (4, 1, 6, 3, 0, 7, 5, 2)])
     assert found.margin == pytest.approx(1.0, abs=0.01)
     assert found.others
     assert all(moved_photos(*_places(found), *_places(each)).any() for each in found.others)
     assert RED in {figure.light for figure in assess_turn(found)}
+
+
+@pytest.mark.parametrize("way", [1, -1])
+def test_the_order_of_the_files_breaks_ties(way: int) -> None:
+    """Photos are mostly taken one after another around the head."""
+    shots = [replace(shot, person=Person.absent()) for shot in ring(EIGHT)][::way]
+    found = find(shots)
+    assert off(found, shots).max() < 10
+    assert found.margin == pytest.approx(1 + IN_ORDER / 8, abs=0.05)
+
+
+def test_the_order_of_the_files_yields_to_what_photos_show() -> None:
+    """Two photos that changed their numbers are put back."""
+    shots = [ring(CARELESS)[i] for i in (0, 1, 2, 4, 3, 5, 6, 7)]
+    assert off(find(shots), shots).max() < 25
 
 
 def test_the_elevation_of_the_ring_is_that_of_the_faces() -> None:
@@ -291,7 +318,7 @@ def test_the_summary_tells_direction_and_every_step() -> None:
     """The last gap counts, too, and photos in no order have no direction."""
     assert "turn to the subject's left, steps 45 to 45 degrees" in find(ring(EIGHT)).summary
     assert "turn to the subject's right, steps" in find(ring(EIGHT[::-1])).summary
-    assert "to 88 degrees" in find(ring(EIGHT[:7])).summary
+    assert "to 89 degrees" in find(ring(EIGHT[:7])).summary
     mixed = [ring(EIGHT)[i] for i in (0, 5, 7, 2, 1, 6, 4, 3)]
     assert "to the subject's" not in find(mixed).summary
 
@@ -362,6 +389,21 @@ def two_people() -> list[Shot]:
         image[low] = (40, 60, 160) if index < 4 else (170, 40, 40)
         shots.append(replace(shot, view=replace(shot.view, image=image)))
     return shots
+
+
+def test_hair_alone_wears_no_clothes() -> None:
+    """Of some persons from behind hair and neck are found: the neck is no shirt."""
+    shots = two_people()
+    for index in (4, 5, 6, 7):
+        alpha = shots[index].person.alpha.copy()
+        top = np.nonzero(alpha.any(axis=1))[0][0]
+        alpha[top + 75 :] = 0
+        neck = (alpha > 0) & (np.arange(HEIGHT)[:, None] > top + 60)
+        image = shots[index].view.image.copy()
+        image[neck] = (170, 40, 40)
+        view = replace(shots[index].view, image=image)
+        shots[index] = replace(shots[index], view=view, person=Person(alpha))
+    assert off(find(shots), shots).max() < 45
 
 
 REFUSED = {
