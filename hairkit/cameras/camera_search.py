@@ -8,7 +8,7 @@ careless one single views are started again from other azimuths.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -37,6 +37,10 @@ RESTART = 2.5
 """How far from where it is found a view is started again, standard deviations of its azimuth."""
 RESTART_NOISE, RESTART_ROUNDS = (2.0, 1.0), 6
 """Times the noise of outlines, and rounds at each, by which starts are compared."""
+FARTHER, FARTHER_NOISE, MOST_FARTHER = 1.2, (4.0, 2.0), 6
+"""Factor by which all distances are tried anew, times the noise of outlines in these rounds, and
+most steps one way. A search ends near the distance from which it starts: of 20 turns without EXIF
+the focal length was 0.7 to 1.2 of the true one, and with steps 0.9 to 1.2."""
 MOST_RESTARTED = 12
 """Views of turns of more are not started again: their neighbours are near and hold them."""
 
@@ -78,18 +82,41 @@ class Search:
     """(P,) standard deviations of the prior."""
     iterations: int
     """Most rounds of Levenberg-Marquardt."""
+    any_distance: bool = True
+    """False where the perspective is known."""
 
     def find(self, start: Fit, restarted: Iterable[int]) -> Fit:
         """Return the best solution; `restarted` are the views that may be anywhere."""
-        fit, seen = start, None
-        for noise in COARSE_TO_FINE:
-            fit, _ = self.descend(fit, noise, self.iterations)
-            seen = self.evidence(fit, 1.0)
-            fit = self._with_care(fit, seen)
-        fit = self.settle(fit, seen=seen)
+        fit = self._from_coarse(start, COARSE_TO_FINE)
+        if self.any_distance and not fit.flat:
+            fit = self._from_distances(fit)
         views = (len(self.spread) - SHARED) // PER_VIEW
         if fit.precision < CARELESS and views <= MOST_RESTARTED:
             fit = self.settle(self._restart(fit, restarted), 1)
+        return fit
+
+    def _from_coarse(self, fit: Fit, noises: Sequence[float]) -> Fit:
+        """Return the solution to which rounds with these times the noise lead."""
+        seen = None
+        for noise in noises:
+            fit, _ = self.descend(fit, noise, self.iterations)
+            seen = self.evidence(fit, 1.0)
+            fit = self._with_care(fit, seen)
+        return self.settle(fit, seen=seen)
+
+    def _from_distances(self, fit: Fit) -> Fit:
+        """Return the best solution from greater distances on, or else from smaller ones."""
+        first = fit
+        for way in (FARTHER, 1 / FARTHER):
+            for _ in range(MOST_FARTHER):
+                vector = fit.vector.copy()
+                vector[PERSPECTIVE] /= way
+                trial = self._from_coarse(replace(fit, vector=vector), FARTHER_NOISE)
+                if trial.cost >= fit.cost:
+                    break
+                fit = trial
+            if fit is not first:
+                break
         return fit
 
     def settle(self, fit: Fit, updates: int = CARE_ROUNDS, seen: Evidence | None = None) -> Fit:

@@ -177,12 +177,12 @@ class TurnFit:
 
     def search(self, iterations: int) -> Search:
         """Return the search for the cameras."""
-        return Search(self.evidence, self.prior_spread, iterations)
+        return Search(self.evidence, self.prior_spread, iterations, self.focal is None)
 
-    def start(self, flat: bool, distance: float = USUAL_DISTANCE) -> Fit:
+    def start(self, flat: bool) -> Fit:
         """Return the nominal turn, its place and magnification as landmarks or masks suggest."""
         vector = np.zeros(self.turn.size)
-        vector[PERSPECTIVE] = 1 / distance
+        vector[PERSPECTIVE] = 1 / USUAL_DISTANCE
         magnification, place = (
             self._place_by_landmarks(self.landmarks, flat)
             if self.landmarks is not None

@@ -19,18 +19,14 @@ from hairkit.types.head import LANDMARKS
 
 from .landmark_transfer import PatchSettings, transfer_landmarks
 
-FAR_DISTANCE = 2.0
-"""Metres from where the search begins again if it fits badly."""
-POOR_COST = 40.0
-"""Cost of a view from which a solution fits badly: the eight rendered captures have 13 to 27 with
-photos alone, photographs of a bald man 72, and 44 from `FAR_DISTANCE`."""
 FLAT_NOISE = 4.0
 """Times the noise of outlines in the first rounds with orthographic cameras."""
 FLAT_ROUNDS = 6
 """Rounds of that, of up to 16 that it would take to settle: its cost is within a tenth then."""
-FLAT_HOPE = 2.0
-"""Times the best cost from which such a solution is not settled, which takes off a third: it is 10
-and more times on perspective captures, 0.4 times on an orthographic one."""
+FLAT_HOPE, FLAT_WINS = 3.0, 1.1
+"""Times the best cost from which such a solution is not settled, which takes off a half, and up to
+which it is the best: it is 10 and more times on perspective captures, then 1.8 and 1.0 on an
+orthographic one, which cameras 2 m away fit as well."""
 
 
 @dataclass(frozen=True)
@@ -78,13 +74,11 @@ def _from_nothing(problem: TurnFit, search: Search, capture: Capture, options: O
         wanted = options.model
     faceless = [i for i, view in enumerate(capture.views) if view.landmarks is None]
     best = search.find(problem.start(wanted == "orthographic"), faceless)
-    if best.cost > POOR_COST * len(capture.views) and not best.flat and problem.focal is None:
-        far = search.find(problem.start(False, FAR_DISTANCE), faceless)
-        best = min(best, far, key=lambda fit: fit.cost)
     if options.model == "auto" and not capture.orthographic:
         flat, _ = search.descend(problem.start(True), FLAT_NOISE, FLAT_ROUNDS)
         if search.cost(flat, problem.evidence(flat, 1.0)) < FLAT_HOPE * best.cost:
-            best = min(best, search.settle(flat, 1), key=lambda fit: fit.cost)
+            flat = search.settle(flat, 1)
+            best = flat if flat.cost < FLAT_WINS * best.cost else best
     return best
 
 

@@ -30,11 +30,19 @@ class Turntable:
 
 
 def turntable(
-    rng: np.random.Generator, *, stray: float = 1.0, model: str = "perspective", noise: float = 0.2
+    rng: np.random.Generator,
+    *,
+    stray: float = 1.0,
+    model: str = "perspective",
+    noise: float = 0.2,
+    distance: float = 0.7,
 ) -> Turntable:
-    """Return the default head photographed eight times; `stray` 0 is the exact turn."""
+    """Return the default head photographed eight times; `stray` 0 is the exact turn.
+
+    It is as large in the photos at any distance.
+    """
     head = default_head()
-    cameras = tuple(_camera(45.0 * i, rng, stray, model) for i in range(8))
+    cameras = tuple(_camera(45.0 * i, rng, stray, model, distance) for i in range(8))
     views, masks = [], []
     marks = head.vertices[head.landmark_vertices].astype(np.float64)
     for index, (name, camera) in enumerate(zip(NAMES, cameras, strict=True)):
@@ -52,16 +60,18 @@ def turntable(
     return Turntable(Capture(tuple(views)), tuple(masks), cameras, head)
 
 
-def _camera(azimuth: float, rng: np.random.Generator, stray: float, model: str) -> Camera:
+def _camera(
+    azimuth: float, rng: np.random.Generator, stray: float, model: str, distance: float
+) -> Camera:
     off = stray * rng.uniform(-1, 1, 7)
     perspective = model == "perspective"
     return Camera.on_turn(
         azimuth + 4 * off[0],
         elevation_deg=3 * off[1],
         roll_deg=2 * off[2],
-        distance=0.7 * (1 + 0.05 * off[3] if perspective else 1),
+        distance=distance * (1 + 0.05 * off[3] if perspective else 1),
         target=np.array([0.0, -0.06, 0.0]) + 0.006 * off[4:7],
-        focal=560.0 if perspective else 800.0,
+        focal=800.0 * distance if perspective else 800.0,
         width=WIDTH,
         height=HEIGHT,
         model="perspective" if perspective else "orthographic",

@@ -10,6 +10,7 @@ from hairkit_plugins.silhouette import Options, estimate_scene
 from turntable import Turntable, azimuth_errors, turntable
 
 from hairkit import Camera, Capture, Face, Mask, Scene, View
+from hairkit.cameras import camera_search
 from hairkit.cameras.camera_search import Evidence, Fit, Search
 from hairkit.cameras.turn_fit import TurnFit
 from hairkit.cameras.turntable import LOG_MAGNIFICATION, PER_VIEW, PERSPECTIVE, SHARED
@@ -91,23 +92,18 @@ def test_orthographic_cameras_start_at_their_scale() -> None:
     assert np.exp(problem.start(flat=False).vector[LOG_MAGNIFICATION]) < 0.97 * exact
 
 
-@pytest.mark.parametrize(("cost", "starts"), [(100.0, [0.7]), (400.0, [0.7, 2.0])])
-def test_a_poor_fit_is_searched_again_from_farther(
-    bust: Turntable, monkeypatch: pytest.MonkeyPatch, cost: float, starts: list[float]
-) -> None:
-    """Cameras that cost more than 40 a view are sought from 2 m too, and the cheaper ones kept."""
-    tried: list[float] = []
-
-    def find(self: Search, start: Fit, restarted: object) -> Fit:
-        tried.append(round(1 / float(start.vector[PERSPECTIVE]), 3))
-        return replace(start, cost=cost / len(tried))
-
-    monkeypatch.setattr(Search, "find", find)
+def test_the_focal_length_of_a_far_camera_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The search begins at 0.7 m, and stays near unless other distances are tried."""
+    table = turntable(np.random.default_rng(11), distance=1.4)
     options = replace(FAST, model="perspective", carries=0)
-    scene = estimate_scene(bust.capture, bust.masks, bust.head, None, options)
-    assert tried == starts
-    distance = np.linalg.norm(scene.cameras[0].position)
-    assert distance == pytest.approx(starts[-1], rel=0.15)
+
+    def focal() -> float:
+        scene = estimate_scene(table.capture, table.masks, table.head, None, options)
+        return scene.cameras[0].focal / table.cameras[0].focal
+
+    assert focal() == pytest.approx(1, abs=0.15)
+    monkeypatch.setattr(camera_search, "MOST_FARTHER", 0)
+    assert focal() < 0.75
 
 
 def test_nothing_is_evaluated_twice(bust: Turntable, monkeypatch: pytest.MonkeyPatch) -> None:
