@@ -44,9 +44,9 @@ FACE_POINTS = np.r_[17:68]
 EYES_AND_MOUTH = (np.r_[36:42], np.r_[42:48], np.r_[48:60])
 """iBUG points of what is no skin inside."""
 CLOTHES_BAND, CLOTHES_DEPTH, CROWN_DEPTH = 0.08, 1.6, 0.25
-"""Clothes are looked for in the lowest rows of the person, a share of the picture's height, if these
-lie so many head widths below the crown: of some persons from behind hair alone is found. Hair is
-what lies above the last depth."""
+"""Clothes are looked for in the lowest rows of the person, a share of the picture's height, if
+these lie so many head widths below the crown: of some persons from behind hair alone is found. Hair
+is what lies above the last depth."""
 NOT_HAIR, CLOTHED = 0.18, 0.3
 """Clothes differ from hair by this much in log chromaticity, in at least this share of the band."""
 HEAD_PIXELS, LEAST_UNLIKE = 16, 0.05

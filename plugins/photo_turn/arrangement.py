@@ -74,7 +74,7 @@ class Evidence:
     unlike: Float64Array | None = None
     """(V, V) how unlike heads look, 0 for a usual pair; None or NaN where unknown."""
     sequence: Int64Array | None = None
-    """(V,) places of the photos in the order in which they were given, or None where that is unknown."""
+    """(V,) places of the photos in the order in which they were given; None where unknown."""
     follow: float = 0.0
     """Logarithm of the odds that the turn follows this order; `inf` for frames of one video."""
 

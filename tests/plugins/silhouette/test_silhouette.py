@@ -11,9 +11,9 @@ from turntable import Turntable, azimuth_errors, turntable
 
 from hairkit import Camera, Capture, Face, Mask, Scene, View
 from hairkit.cameras import camera_search
-from hairkit.cameras.camera_search import Evidence, Fit, Search
+from hairkit.cameras.camera_search import Evidence, Fit
 from hairkit.cameras.turn_fit import TurnFit
-from hairkit.cameras.turntable import LOG_MAGNIFICATION, PER_VIEW, PERSPECTIVE, SHARED
+from hairkit.cameras.turntable import LOG_MAGNIFICATION, PER_VIEW, SHARED
 
 FAST = Options(contour_points=40)
 """Fewer rays along outlines than the default, for half of its time."""
