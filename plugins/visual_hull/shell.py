@@ -51,8 +51,10 @@ FRONT_SHARE = 1.0
 """How far hair lies before the scalp's front edge, in its thickness beside the head."""
 HANGS_BACK = 0.01
 """How far behind that edge hair hangs freely below the chin, metres."""
-CUT_OFF = 0.15
-"""How far hair goes on that the picture's lower edge cuts off, metres: from the chin to the chest.
+CUT_OFF = 0.1
+"""How far hair goes on that the picture's lower edge cuts off, metres. Fronts of eight heads cropped below
+the chin have F at 4 mm/40 of 55.9 without it, 61.0 with 0.075, 60.6 with 0.1 and lengths nearer the
+true ones, 58.1 with 0.15, 45.9 with 0.3.
 """
 FACE = 0.4
 """Cosine of the bearing up to which an outline is that of the face."""
