@@ -52,9 +52,9 @@ FRONT_SHARE = 1.0
 HANGS_BACK = 0.01
 """How far behind that edge hair hangs freely below the chin, metres."""
 CUT_OFF = 0.1
-"""How far hair goes on that the picture's lower edge cuts off, metres. Fronts of eight heads cropped below
-the chin have F at 4 mm/40 of 55.9 without it, 61.0 with 0.075, 60.6 with 0.1 and lengths nearer the
-true ones, 58.1 with 0.15, 45.9 with 0.3.
+"""How far hair goes on that the picture's lower edge cuts off, metres. Fronts of eight heads, cut
+off below the chin, have F at 4 mm/40 of 55.9 (length 0.55) without it, 61.0 (0.71) with 0.075, 60.6
+(0.75) with 0.1, 58.1 (0.85) with 0.15, 45.9 (1.51) with 0.3.
 """
 FACE = 0.4
 """Cosine of the bearing up to which an outline is that of the face."""
@@ -215,7 +215,10 @@ def _outline(camera: Camera, mask: Mask, middle: Float64Array, side: float) -> F
     points = middle + _feet()[:, None] + radii[:, None] * _outwards(side)[:, None]
     found = np.where(_hair_at(camera, mask, points), radii, 0.0).max(axis=1)
     lowest = int((found > 0).argmax())
-    if lowest and camera.project(points[lowest - 1, round(found[lowest] / PROBE)])[1] > camera.height:
+    if (
+        lowest
+        and camera.project(points[lowest - 1, round(found[lowest] / PROBE)])[1] > camera.height
+    ):
         found[max(lowest - round(CUT_OFF / STEP), 0) : lowest] = found[lowest]
     return np.asarray(found)
 
