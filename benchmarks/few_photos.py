@@ -6,7 +6,8 @@ One is the front, two are the front and 45 degrees to the subject's left, three 
 The groom is moved into the truth's frame by the landmarks of its fitted head, since one camera
 fixes no scale. F is in per cent. The visible part is what the cameras of the photos see: true
 samples within 3 mm of the first surface of one of them, and predicted samples at most that far
-behind it. Lengths are over the true ones.
+behind it; hair behind clothes, which the truth has no mesh of, is left out of both by the true
+masks. Lengths are over the true ones.
 """
 
 from __future__ import annotations
@@ -20,14 +21,21 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 from captures_argument import NO_CAPTURES, add_captures
 
+from hairkit.cameras.depth_raster import head_depth
 from hairkit.cameras.similarity import fit_similarity
 from hairkit.errors import InputError
 from hairkit.evaluation import Truth, read_truth
-from hairkit.evaluation.depth_map import first_surface, near_some_surface
+from hairkit.evaluation.depth_map import (
+    HAIR_FOOTPRINT_PX,
+    Surface,
+    first_surface,
+    near_some_surface,
+)
 from hairkit.evaluation.scores import OUTER_DEPTH, sample_hits, sample_strands, scores_of_hits
 from hairkit.head_model.template import default_head
 from hairkit.io.capture_reader import TURN, photo_files
@@ -41,6 +49,8 @@ GUIDES = 8000
 """Strands of a head."""
 PHOTOS = {1: ["front"], 2: ["front", "front-left"], 3: ["front", "front-left", "left"]}
 """Views by the number of photos; other numbers take the whole turn."""
+TRUE_HAIR = 255
+"""Label of hair in a true mask."""
 COLUMNS = ("visible 4/40", "visible 3/30", "all 4/40", "all 3/30", "length", "processor s")
 
 
@@ -106,8 +116,7 @@ def _scores(groom: Groom, truth: Truth, views: list[str]) -> list[float]:
     own = groom.head.vertices[groom.head.landmark_vertices].astype(np.float64)[JAW_LANDMARKS:]
     moved = fit_similarity(own, marks, np.ones(len(marks))).apply(groom.strands.points)
     strands = replace(groom.strands, points=moved.astype(np.float32))
-    cameras = [truth.cameras[truth.names.index(view)] for view in views]
-    surfaces = [first_surface(c, truth.samples.points, truth.head) for c in cameras]
+    surfaces = [_surface(truth, truth.names.index(view)) for view in views]
     seen = near_some_surface(truth.samples.points, surfaces, OUTER_DEPTH)
     true = replace(truth.samples, marked=seen)
     hits = sample_hits(sample_strands(strands), true, surfaces=surfaces, visible=True)
@@ -116,6 +125,16 @@ def _scores(groom: Groom, truth: Truth, views: list[str]) -> list[float]:
     scores = [found.outer[2], found.outer[1], found.all[2], found.all[1]]
     length = strands.lengths().mean() / truth.strands.lengths().mean()
     return [*(100 * score.f for score in scores), float(length)]
+
+
+def _surface(truth: Truth, view: int) -> Surface:
+    """Return the first surface that a view sees, with nothing to be seen in pixels of clothes."""
+    camera, labels = truth.cameras[view], truth.hair_mask(view)
+    near = np.ones((HAIR_FOOTPRINT_PX, HAIR_FOOTPRINT_PX), np.uint8)
+    hair = cv2.dilate((labels == TRUE_HAIR).astype(np.uint8), near) > 0
+    clothes = (labels > 0) & ~hair & ~np.isfinite(head_depth(truth.head, camera))
+    surface = first_surface(camera, truth.samples.points, truth.head)
+    return replace(surface, depth=np.where(clothes, -np.inf, surface.depth).astype(np.float32))
 
 
 if __name__ == "__main__":

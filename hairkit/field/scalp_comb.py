@@ -48,8 +48,9 @@ hairline, from which it crosses at all and for sure: 0.73 to 0.92 on fringes and
 back, at most 0.17 elsewhere."""
 FOREHEAD, FOREHEAD_WIDTH = 0.03, 0.04
 """Height of the forehead below the hairline that a fringe covers, and half its width, metres."""
-LEAST_COVERED = 0.5
-"""Share of it that is hair below a fringe: 0.95 to 1 there, 0 to 0.33 elsewhere."""
+LEAST_COVERED, MOST_BARE = 0.5, 0.1
+"""Share of it that is hair below a fringe, 0.95 to 1 there, 0 to 0.33 elsewhere; and up to which
+hair may be combed back: 0.00 there, 0.20 where it falls to one side over the forehead."""
 
 
 class Front(NamedTuple):
@@ -68,8 +69,11 @@ def see_front(
     across = _across_hairline(sight, head)
     if across < LEAST_ACROSS:
         return Front(0.0, 0.0)
-    covered = forehead_covered(masks, cameras, head) >= LEAST_COVERED
-    return Front(1.0 if covered else -1.0, _share(across, LEAST_ACROSS, FULL_ACROSS))
+    covered = forehead_covered(masks, cameras, head)
+    if MOST_BARE < covered < LEAST_COVERED:
+        return Front(0.0, 0.0)
+    way = 1.0 if covered >= LEAST_COVERED else -1.0
+    return Front(way, _share(across, LEAST_ACROSS, FULL_ACROSS))
 
 
 def comb_beside_parting(skin: Parting, front: Front) -> Parting:

@@ -15,8 +15,10 @@ from hairkit.arrays import Float32Array, Float64Array, unit_vectors
 from hairkit.cameras.depth_raster import SPLAT_CELLS, depth_behind, head_depth, point_depth
 from hairkit.field.cell_shells import dense_surface
 from hairkit.field.growth_prior import mix_directions
+from hairkit.field.hanging_hair import hanging_axes
 from hairkit.field.smooth_volume import smooth_volume
 from hairkit.types.evidence import Evidence
+from hairkit.types.head import Head
 from hairkit.types.strands import CONTINUED, SEEN, Strands
 from hairkit.types.volume import Hull, cell_slopes, outer_products
 
@@ -41,14 +43,23 @@ def add_surface_planes(planes: Float64Array, hull: Hull, share: float) -> Float6
 
 
 def add_flow(
-    hull: Hull, growth: Float32Array, tensor: Float32Array, certainty: Float32Array
+    head: Head,
+    hull: Hull,
+    growth: Float32Array,
+    share: float,
+    tensor: Float32Array,
+    certainty: Float32Array,
 ) -> tuple[Float32Array, Float32Array]:
     """Return tensors (N, 6) and certainty (N,) of the loose cells with the way to the tips added.
 
-    `growth` (X, Y, Z) is the potential that rises to the tips.
+    `growth` (X, Y, Z) is the potential that rises to the tips of long hair, whose `share` is 1. The
+    tips of short hair are all of the hull's surface, and it lies as gravity has it.
     """
     data, weight = tensor.copy(), certainty.copy()
-    flow = unit_vectors(cell_slopes(growth, hull.loose).astype(np.float64))
+    flow = share * unit_vectors(cell_slopes(growth, hull.loose).astype(np.float64))
+    if share < 1:
+        at, height = hull.grid.centres_of(hull.loose), hull.head_distance[hull.loose]
+        flow = unit_vectors(flow + (1 - share) * hanging_axes(head, at, height))
     every = np.ones(len(flow), bool)
     mix_directions(data, weight, every, flow, np.where(flow.any(axis=1), FLOW_WEIGHT, 0.0))
     return data, weight

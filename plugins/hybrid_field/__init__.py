@@ -101,7 +101,7 @@ def solve_field(
     comb = comb_cells(scene.head, hull, growth, parting, length)
     prior = ScalpPrior(options.scalp_weight, options.parting_weight)
     seen = fused.tensor, fused.certainty
-    seen = add_flow(hull, growth, *seen) if part else seen
+    seen = add_flow(scene.head, hull, growth, long_share(length), *seen) if part else seen
     wanted, weight = add_scalp_prior(scene.head, hull, *seen, comb, prior, parting, length)
     cells = CellGraph.of(hull.loose)
     with ThreadPoolExecutor(thread_count()) as pool:

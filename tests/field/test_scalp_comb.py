@@ -178,6 +178,23 @@ def test_hair_that_crosses_the_hairline_is_combed_back_where_the_forehead_is_bar
     assert found.line is None
 
 
+@pytest.mark.parametrize(("from_x", "forward"), [(1.0, -1.0), (0.015, 0.0), (-1.0, 1.0)])
+def test_hair_over_a_part_of_the_forehead_is_combed_to_the_side(
+    from_x: float, forward: float
+) -> None:
+    """Neither back, which bares the whole forehead, nor forward, which hides it."""
+    camera = ball.cameras()[0]
+    bare, _ = ball.drawn(camera, across, BARE)
+    hidden, found = ball.drawn(camera, combed(Parting(swept_back=True)), COVERED)
+    edge = camera.project(np.array([from_x, 0.0, 0.1]))[0]
+    beside = np.arange(camera.width) > edge
+    masks = (replace(bare, labels=np.where(beside, hidden.labels, bare.labels)),)
+    sight = see_scalp(masks, (found,), (camera,), ball.HEAD)
+    front = see_front(sight, masks, (camera,), ball.HEAD)
+    assert front.forward == forward
+    assert (front.sureness > 0) == (forward != 0)
+
+
 @pytest.mark.parametrize("skin", [Parting.at(0.0), Parting()])
 def test_hair_that_crosses_the_hairline_is_a_fringe_where_the_forehead_is_covered(
     skin: Parting,

@@ -46,10 +46,29 @@ def test_unseen_hair_runs_to_the_tips() -> None:
     tensor, sure = np.zeros((count, 6), np.float32), np.zeros(count, np.float32)
     tensor[:, XX] = 1
     sure[::2] = 1
-    mixed, weight = add_flow(hull, growth, tensor, sure)
+    mixed, weight = add_flow(ball_head(), hull, growth, 1.0, tensor, sure)
     assert mixed[1::2, YY] == pytest.approx(1.0, abs=1e-5)
     assert mixed[::2, XX].min() > 0.9
     assert weight[1::2] == pytest.approx(FLOW_WEIGHT)
+
+
+def test_short_hair_that_is_not_seen_lies_along_the_head() -> None:
+    """Its tips are all of the surface, so that the way to them leads off the head: below the crown
+    it turns down instead, the more the farther it is from the skin."""
+    hull = shell()
+    count = int(hull.loose.sum())
+    nothing = np.zeros((count, 6), np.float32), np.zeros(count, np.float32)
+    at = hull.grid.centres_of(hull.loose).astype(np.float64)
+    side = np.abs(at[:, 1]) < 0.03
+    low, high = (
+        side & (np.abs(np.linalg.norm(at, axis=1) - far) < 0.005) for far in (0.105, 0.125)
+    )
+    down = [
+        add_flow(ball_head(), hull, hull.head_distance, share, *nothing)[0][:, YY]
+        for share in (0.0, 1.0)
+    ]
+    assert down[0][high].mean() > down[0][low].mean() > 0.4
+    assert down[1][high].mean() < 0.1
 
 
 def test_strands_before_a_camera_are_seen() -> None:

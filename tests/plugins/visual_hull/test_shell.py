@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hairkit_plugins.visual_hull import Options, build_hull
+from hairkit_plugins.visual_hull.shell import CUT_OFF
 
 from hairkit.cameras.depth_raster import head_depth
 from hairkit.head_model.template import default_head
@@ -55,6 +56,17 @@ def test_hair_behind_is_as_thick_as_beside() -> None:
     assert -level[:, 2].min() - back == pytest.approx(THICK, abs=0.008)
     behind = found[found[:, 2] < -0.07]
     assert behind[:, 1].min() == pytest.approx(LOW, abs=0.015)
+
+
+@pytest.mark.parametrize("height", [-0.08, -0.1])
+def test_hair_that_the_lower_edge_cuts_off_goes_on(height: float) -> None:
+    """It ends `CUT_OFF` below the edge of a photo that is cropped above the hair's ends."""
+    scene, masks = photo()
+    edge = round(float(scene.cameras[0].project([0.1, height, 0.0])[1]))
+    cropped = replace(scene, cameras=(replace(scene.cameras[0], height=edge),))
+    found = cells(build_hull(cropped, (Mask(masks[0].labels[:edge], True),), OPTIONS))
+    behind = found[found[:, 2] < -0.07]
+    assert behind[:, 1].min() == pytest.approx(height - CUT_OFF, abs=0.02)
 
 
 def test_seen_skin_stays_bare() -> None:
