@@ -73,10 +73,10 @@ MOST_HANDED_ON = 12
 """Arrangements that are handed on."""
 WHOLE_TURN = 3
 """Photos that can go around a head; fewer are no turn."""
-FEW, PROFILE_SHARE = 4, 0.38
-"""Photos at most of which none need be from behind, and the share of skin in a head's outline from
-which one without a face is a profile, over the largest with one: nine rendered heads have 0.38 to
-0.82 in profile, and from behind 0.36 at most, but curls 0.49 and tied hair 0.57."""
+FEW, PROFILE_MOMENT = 4, 0.055
+"""Photos at most of which none need be from behind, and the sideways moment of skin from which one
+without a face is a profile, over the largest share with one: of eight rendered captures profiles
+have 0.07 to 0.17, and photos from behind 0.04 at most, but tied hair from aside 0.07."""
 CLOSE = 7
 """Photos from which neighbours are near enough to look alike: of 6 of a turn of eight, with gaps,
 more turns would be sure and wrong."""
@@ -184,14 +184,14 @@ def _is_part(yaw_deg: Float64Array, named: BoolArray) -> bool:
 
 
 def _are_profiles(seen: Evidence) -> bool:
-    """Return whether photos without a face show so much skin that none is from behind.
+    """Return whether photos without a face show skin so far aside that none is from behind.
 
     Two faces are needed: an even turn of so few photos shows one.
     """
     bare = np.isnan(seen.yaw_deg)
     if seen.skin is None or np.count_nonzero(~bare) < 2:
         return False
-    return bool((seen.skin[bare, 0] >= PROFILE_SHARE * seen.skin[~bare, 0].max()).all())
+    return bool((np.abs(seen.skin[bare, 1]) >= PROFILE_MOMENT * seen.skin[~bare, 0].max()).all())
 
 
 def _with_profiles(seen: Evidence) -> Evidence:

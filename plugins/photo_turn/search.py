@@ -116,7 +116,7 @@ class Search:
         generator = np.random.default_rng(0)
         places = []
         if evidence.sequence is not None:
-            even = 360.0 / len(self.photos) * evidence.sequence
+            even = np.asarray(360.0 / len(self.photos) * evidence.sequence, np.float64)
             places = [_turned_to_faces(way * even, evidence) for way in (1.0, -1.0)]
         if not np.isinf(evidence.follow):
             places += [_start(evidence, generator) for _ in range(starts)]
