@@ -19,6 +19,7 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -41,9 +42,23 @@ from hairkit.types.groom import Groom
 GUIDES, STRANDS = 8000, 10_000
 FRAMES, RATE = 120, 6.0
 """Of a film of 20 seconds; what lies between these frames of a phone's film is left out."""
-SIZE = (810, 1440)
-FOCAL, DISTANCE, TARGET = 1.75, 0.756, (0.0, -0.10, 0.0)
-"""Focal length over the width; metres."""
+
+
+class Lens(NamedTuple):
+    """What a camera sees of a person."""
+
+    size: tuple[int, int]
+    focal: float
+    """Pixels."""
+    distance: float
+    """Metres."""
+    aim: float
+    """Height at which it aims, metres."""
+
+
+CROPPED = Lens((810, 1440), 1417.5, 0.756, -0.10)
+MAIN_LENS = Lens((1512, 2016), 1451.52, 0.8, -0.16)
+"""Of a phone: 26 mm equivalent."""
 UNEVEN, TILT, ROLL, NEARER, ASIDE = 8.0, 5.0, 3.0, 0.08, 0.03
 """Greatest drifts: degrees of azimuth, elevation and roll, share of the distance, metres."""
 COLUMNS = ("4/40", "3/30", "2/20", "length", "azimuth off", "red", "amber", "processor s")
@@ -62,15 +77,16 @@ def main() -> None:
         with tempfile.TemporaryDirectory() as made:
             film = shoot(grow(style, default_head(), STRANDS, args.seed), Path(made), args.seed)
             for source, figures in rows.items():
-                figures.append(film.figures(source))
-                print(_row(style, source, figures[-1]), flush=True)
+                figures.append(film.figures(source, GUIDES))
+                print(format_row(f"{style} | {source}", figures[-1]), flush=True)
     for source, figures in rows.items():
-        print(_row("mean", source, np.mean(figures, axis=0).tolist()))
+        print(format_row(f"mean | {source}", np.mean(figures, axis=0).tolist()))
 
 
-def _row(style: str, source: str, figures: Sequence[float]) -> str:
+def format_row(name: str, figures: Sequence[float]) -> str:
+    """Return a row of the table."""
     shown = [f"{value:.2f}" if k == 3 else f"{value:.1f}" for k, value in enumerate(figures)]
-    return f"| {style} | {source} | {' | '.join(shown)} |"
+    return f"| {name} | {' | '.join(shown)} |"
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,13 +97,13 @@ class Film:
     folder: Path
     cameras: list[Camera]
 
-    def figures(self, source: str) -> list[float]:
+    def figures(self, source: str, guides: int) -> list[float]:
         """Reconstruct a source and return its row."""
         photos = self.folder / ("film.mp4" if source == "film" else "photos")
         recipe = load_recipe("default")
         stages = tuple(stage for stage in recipe.stages if stage.table != EXPORT.table)
         out, began = self.folder / source, _processor_seconds()
-        options = {"guides": GUIDES, "sheet": False, "keep_work": False}
+        options = {"guides": guides, "sheet": False, "keep_work": False}
         reconstruct(photos, out, replace(recipe, stages=stages), **options)
         seconds = _processor_seconds() - began
         lights = [each["light"] for each in json.loads((out / RECORD).read_text())["health"]]
@@ -121,7 +137,7 @@ def shoot(groom: Groom, folder: Path, seed: int) -> Film:
     room = cluttered_room(cameras[0], generator)
     (folder / "photos").mkdir()
     code = cv2.VideoWriter.fourcc(*"mp4v")
-    film = cv2.VideoWriter(str(folder / "film.mp4"), code, RATE, SIZE)
+    film = cv2.VideoWriter(str(folder / "film.mp4"), code, RATE, CROPPED.size)
     for first in range(0, FRAMES, 10):
         some = cameras[first : first + 10]
         still = {"lights": shot.lights, "backgrounds": [room] * len(some), "solids": [shot.torso]}
@@ -135,8 +151,9 @@ def shoot(groom: Groom, folder: Path, seed: int) -> Film:
     return Film(groom, folder, cameras)
 
 
-def drifting_cameras(generator: np.random.Generator) -> list[Camera]:
+def drifting_cameras(generator: np.random.Generator, lens: Lens | None = None) -> list[Camera]:
     """Return the cameras of all frames."""
+    lens = lens or CROPPED
 
     def drift(most: float) -> Float64Array:
         waves = np.arange(1, 4)
@@ -154,11 +171,11 @@ def drifting_cameras(generator: np.random.Generator) -> list[Camera]:
             azimuth[k],
             elevation_deg=tilt[k],
             roll_deg=roll[k],
-            distance=DISTANCE * (1 + nearer[k]),
-            target=(aside[k], *TARGET[1:]),
-            focal=FOCAL * SIZE[0],
-            width=SIZE[0],
-            height=SIZE[1],
+            distance=lens.distance * (1 + nearer[k]),
+            target=(aside[k], lens.aim, 0.0),
+            focal=lens.focal,
+            width=lens.size[0],
+            height=lens.size[1],
         )
         for k in range(FRAMES)
     ]

@@ -31,6 +31,7 @@ KNOWN_TURN = SimpleNamespace(
     ),
 )
 """In the place of `silhouette`, whose search takes longer than all else."""
+SMALL_LENS = SimpleNamespace(size=(180, 320), focal=315.0, distance=0.756, aim=-0.1)
 SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
     "analogies": ({"SMALL": 16, "LARGE": 24, "SEEDS": 1, "ROWS": 1}, []),
     "batch": ({"JOBS": 4, "WARM": 2, "WAITING": 2, "WAIT_S": 0.0}, []),
@@ -72,6 +73,7 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
         },
         [],
     ),
+    "persons": ({"GUIDES": 60, "STRANDS": 2000, "CROPPED": SMALL_LENS}, ["fringe:28"]),
     "robustness": ({}, ["--grooms", "2"]),
     "render": ({"GUIDES": 40}, ["--strands", "60", "--points", "8", "--size", "60x80"]),
     "scaling": (
@@ -92,7 +94,7 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
     "threads": ({"REPETITIONS": 1}, ["--runs", "2"]),
     "turn": ({"SHUFFLES": 1}, ["CAPTURES"]),
     "video": (
-        {"GUIDES": 60, "STRANDS": 300, "FRAMES": 60, "SIZE": (180, 320)},
+        {"GUIDES": 60, "STRANDS": 300, "FRAMES": 60, "CROPPED": SMALL_LENS},
         ["--styles", "short"],
     ),
     "viewer": (
