@@ -2,8 +2,8 @@
 
 An arrangement gives each photo an azimuth. Faces, outlines, skin and the evenness of the steps
 score it, each alone and for many arrangements at once: azimuths are (B, V), costs (B,). Costs are
-negative logarithms of likelihoods. The order of the photos is that of time in a video, and likely so
-in a folder; nothing else depends on it.
+negative logarithms of likelihoods. The order of the photos is that of time in a video, and likely
+so in a folder; nothing else depends on it.
 """
 
 from __future__ import annotations
