@@ -187,7 +187,6 @@ def test_shuffled_photos_are_sorted(azimuths: tuple[float, ...], seed: int) -> N
     found = find([shots[i] for i in moved])
     assert off(found, [shots[i] for i in moved]).max() < 25
     assert np.array_equal(found.azimuth_deg, want.azimuth_deg[moved])
-    assert found.margin < want.margin + 0.01  # nothing speaks for this order
 
 
 def test_a_speck_for_a_person_silences_one_photo_alone() -> None:
