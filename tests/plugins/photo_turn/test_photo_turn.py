@@ -114,7 +114,7 @@ def off(turn: Turnaround, shots: Sequence[Shot]) -> Float64Array:
 
 @pytest.mark.parametrize("azimuths", [EIGHT, CARELESS], ids=["even", "careless"])
 @given(first=st.integers(0, 7), reverse=st.booleans())
-@settings(max_examples=16, deadline=None)
+@settings(max_examples=8, deadline=None)
 def test_neither_direction_nor_first_photo_matters(
     azimuths: tuple[float, ...], first: int, reverse: bool
 ) -> None:
