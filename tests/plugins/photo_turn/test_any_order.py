@@ -1,4 +1,4 @@
-"""Neither order nor names of the photos change a run."""
+"""Where photos tell the turn, neither their order nor their names change a run."""
 
 from __future__ import annotations
 
