@@ -57,6 +57,9 @@ LEFT, BELOW = 1.1, -0.5
 the upward part of the surface's normal below them. Tips of true strands are at 1.00 to 1.09 there
 (medians of seven heads; 1.8 of an eighth), below at up to 1.85: they hang below what all views
 agree on."""
+EARLY = 0.2
+"""Share of the way from the root to the tips on which no strand ends by standing out of the hair:
+at the end of a parting long hair would be a tuft of stubs."""
 CENTIMETRES = 100
 """Of a metre: the unit of the internal distance where the field has none of its own."""
 
@@ -153,8 +156,8 @@ def track(
         bare = find_bare_cells(strands, hull, masks, scene.cameras, scene.head)
         seeds = spread_seeds(bare, hull, options.cover * len(strands))
         if len(seeds):
-            back = grow(field, volume, seeds, way, options, shoulders, -1.0)
-            ahead = grow(field, volume, seeds, way, options, shoulders)
+            back = grow(field, volume, seeds, way, options, shoulders, -1.0, early=0)
+            ahead = grow(field, volume, seeds, way, options, shoulders, early=0)
             ways = (s.points.reshape(len(seeds), -1, 3) for s in (back, ahead))
             strands = lead_to_roots(strands, roots.positions, *ways)
     return finish(replace(strands, root_uv=roots.uv), waves, tied, hull, field, options)
@@ -168,6 +171,7 @@ def grow(
     options: Options,
     shoulders: float = -np.inf,
     sign: float = 1.0,
+    early: float = EARLY,
 ) -> Strands:
     """Return the strands grown from `starts` (N, 3), metres.
 
@@ -180,6 +184,8 @@ def grow(
         Height below which strands that leave the hair may have met the shoulders, metres.
     sign
         1 to grow along the field, -1 against it.
+    early
+        Share of the way on which no strand ends by standing out of the hair.
     """
     left = -field.grid.sample(field.growth, starts).astype(np.float64)
     ways = way + long_share(way) * np.maximum(left - way, 0)
@@ -198,6 +204,7 @@ def grow(
         options.slide_from,
         options.pull,
         sign,
+        early,
     )
     order = np.lexsort((field.grid.nearest_cell(starts) // BLOCK).T)
     growth = (volume, rules, for_kernel(starts), limits, order, points)
@@ -274,6 +281,8 @@ class Rules(NamedTuple):
     """Sine of the turn back for each unit of internal distance beyond `slide_from`."""
     sign: float
     """1 to grow along the field, -1 against it."""
+    early: float
+    """Share of the way on which no strand ends by standing out of the hair."""
 
 
 @compiled_with(allocates=True)
@@ -340,7 +349,8 @@ def _grow_strand(
         stands = False
         if rules.slide_sine > 0 and found[DISTANCE] >= rules.slide_from:
             back = rules.pull * (found[DISTANCE] - rules.slide_from)
-            stands = _slide(volume, rules, back, p, d, i < limits[1])
+            leaves = found[DISTANCE] > LEFT and i < rules.early * limits[1]
+            stands = _slide(volume, rules, back, p, d, i < limits[1], leaves)
         for axis in range(3):
             p[axis] += rules.step * d[axis]
         copy_point(p, path[count])
@@ -355,11 +365,18 @@ def _grow_strand(
 
 @compiled_with(allocates=True, inside=True)
 def _slide(
-    volume: SignedVolume, rules: Rules, back: float, p: Float64Array, d: Float64Array, slides: bool
+    volume: SignedVolume,
+    rules: Rules,
+    back: float,
+    p: Float64Array,
+    d: Float64Array,
+    slides: bool,
+    leaves: bool,
 ) -> bool:
     """Bend d along the hair's surface, and `back` into the hair, where it `slides` or turns.
 
-    Return whether it stands out of the hair, but for below.
+    It turns where it meets the shoulders, or `leaves` the hair near its root. Return whether it
+    stands out of the hair, but for below.
     """
     normal = np.empty(3)
     distance = volume.values[..., DISTANCE : DISTANCE + 1]
@@ -371,7 +388,7 @@ def _slide(
                 d[axis] -= (max(outward, 0.0) + back) * normal[axis]
             make_unit(d)
         return False
-    if slides and p[1] < rules.shoulders:
+    if leaves or (slides and p[1] < rules.shoulders):
         _turn(volume, rules, back, p, normal, d)
         return False
     return bool(normal[1] > BELOW)

@@ -81,6 +81,17 @@ def test_a_bald_crown_bears_no_roots(shift_px: float) -> None:
     assert up.max() < np.cos(np.radians(28.0))
 
 
+def test_hair_grows_up_to_the_line_of_a_parting() -> None:
+    """A bare strip over the crown, narrow as a finger, closes; the forehead before it stays bare."""
+    head = default_head()
+    scene, scalp = scene_of(head), head.scalp > 0.5
+    parted = scalp & (np.abs(head.vertices[:, 0]) < 0.004) & crown(head, 45.0)
+    density = measure_hairline(scene, masks_of(scene, scalp & ~parted)).density
+    assert density[parted].mean() > 0.9
+    forehead = ~scalp & (head.vertices[:, 2] > 0.05) & (np.abs(head.vertices[:, 0]) < 0.03)
+    assert density[forehead].mean() < 0.1
+
+
 def test_a_fringe_does_not_hide_roots_and_nothing_is_taken_where_nobody_looks() -> None:
     """Covered skin keeps its hair, and so does skin that no camera sees."""
     head = default_head()

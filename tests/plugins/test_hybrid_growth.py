@@ -90,7 +90,7 @@ def test_strands_slide_along_the_surface_they_meet_at_a_small_angle() -> None:
     options = replace(FREE, slide_sine=0.35, reach=1.0, inertia=0.0, blind=0.0, bound=1.5)
     starts = np.array([[-0.1, -0.005, 0.0]], np.float32)
     flat, steep = (
-        grow(field, signed_volume(field, field.direction, distance), starts, 0.15, options)
+        grow(field, signed_volume(field, field.direction, distance), starts, 0.15, options, early=0)
         for field in (constant((0.97, 0.24, 0)), constant((0.5, 0.87, 0)))
         if field.direction is not None
     )
@@ -127,6 +127,20 @@ def test_strands_that_meet_the_shoulders_turn_where_the_hair_goes_on(
         assert abs(below[1]) < 0.012
     else:
         np.testing.assert_allclose(below, above, atol=1e-6)
+
+
+@pytest.mark.parametrize(("way", "turns"), [(0.3, True), (0.05, False)])
+def test_long_hair_is_no_stub_where_it_leaves_near_its_root(way: float, turns: bool) -> None:
+    """Out of the top after 3 cm: long hair goes on where the tips lie, short hair ends there."""
+    distance = (1 + 10 * GRID.centres()[..., 1]).astype(np.float32)
+    growth = (GRID.centres() @ [1.0, 0.2, 0]).astype(np.float32)
+    field = replace(constant((0, 1, 0)), growth=growth)
+    assert field.direction is not None
+    options = replace(FREE, slide_sine=0.35, reach=1.0, blind=0.0)
+    starts = np.array([[-0.1, -0.02, 0.0]], np.float32)
+    grown = grow(field, signed_volume(field, field.direction, distance), starts, way, options)
+    length, height = grown.lengths()[0], grown.tips[0, 1]
+    assert length > 0.1 if turns else 0.008 < height < 0.013
 
 
 def test_long_strands_grow_as_far_as_their_own_tips() -> None:
