@@ -13,7 +13,7 @@ import numpy as np
 from hairkit.arrays import Float32Array, Float64Array, unit_vectors
 from hairkit.field.growth_prior import WHORL_BEHIND
 from hairkit.types.head import Head
-from hairkit.types.volume import Hull, OrientationField, ScalpDistance
+from hairkit.types.volume import Hull, OrientationField, ScalpDistance, symmetric_matrices
 
 AWAY = 0.4
 """Part of the direction away from the whorl, against 1 straight down: 0.7 leaves F at 4 mm within 1
@@ -23,8 +23,13 @@ LIFT, STANDS_OFF = 1.0, 0.05
 head in metres at which it has fallen to 0: with 0.03 m F at 4 mm falls from 79 to 74 on curls,
 without it to 32."""
 SAG = 0.06
-"""Way from the scalp in metres on which coils sag as much as they stand. On a head with coils of
-15 cm along their axes F at 4 mm is 68, and their length right; halved or doubled 66."""
+"""Least way from the scalp in metres on which coils sag as much as they stand. On a head with coils
+of 15 cm along their axes F at 4 mm is 68, and their length right; halved or doubled 66."""
+STIFFER, SEEN_STIFFER = (1, 2, 4, 8), 3
+"""Times `SAG` of coils that carry themselves better, and by how much photos show them better than
+the strands are on the whole: what is seen lies on top."""
+SAMPLED = 8
+"""Every so many cells are compared with the photos."""
 
 
 def hang_curls(head: Head, hull: Hull, growth: Float32Array) -> OrientationField:
@@ -33,15 +38,29 @@ def hang_curls(head: Head, hull: Hull, growth: Float32Array) -> OrientationField
     return _field(hull, growth, hanging_axes(head, at, hull.head_distance[hull.loose]))
 
 
-def stand_coils(hull: Hull, way: ScalpDistance, growth: Float32Array) -> OrientationField:
+def stand_coils(
+    hull: Hull,
+    way: ScalpDistance,
+    growth: Float32Array,
+    tensor: Float32Array,
+    certainty: Float32Array,
+) -> OrientationField:
     """Return the signed field of the axes of coils; `growth` is the field's potential.
 
-    They run away from the head's middle, and sag in proportion to the `way` from the scalp.
+    They run away from the head's middle, and sag in proportion to the `way` from the scalp: as much
+    as leaves least of what photos show along them. `tensor` (N, 6) and `certainty` (N,) are the
+    directions that photos show in the loose cells; of steep coils they lie across the axes.
     """
-    cells = hull.loose
-    axes = unit_vectors(hull.grid.centres_of(cells)).astype(np.float64)
-    axes[:, 1] -= way.values[cells] / SAG
-    return _field(hull, growth, axes)
+    outward = unit_vectors(hull.grid.centres_of(hull.loose)).astype(np.float64)
+    drop = way.values[hull.loose, None] * [0.0, 1.0, 0.0]
+    some = slice(None, None, SAMPLED)
+    tensors = certainty[some, None, None] * symmetric_matrices(tensor[some])
+
+    def along(times: float) -> float:
+        axes = unit_vectors(outward[some] - drop[some] / (SEEN_STIFFER * times * SAG))
+        return float(np.einsum("ni,nij,nj->", axes, tensors, axes, optimize=True))
+
+    return _field(hull, growth, outward - drop / (min(STIFFER, key=along) * SAG))
 
 
 def _field(hull: Hull, growth: Float32Array, axes: Float64Array) -> OrientationField:

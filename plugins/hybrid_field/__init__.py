@@ -83,15 +83,15 @@ def solve_field(
 ) -> OrientationField:
     """Return the blended field with its signs and the internal distance."""
     growth = growth_potential(hull, scalp_distance)
-    if waves.coiled:
-        return stand_coils(hull, scalp_distance, growth)
-    if waves.curly:
+    if waves.curly and not waves.coiled:
         return hang_curls(scene.head, hull, growth)
     length = scalp_distance.hair_length
     way = Way(growth, scene.head, parting, length)
     part = scene.one_sided
     surface = part * long_share(length)  # short hair stands off, and its ends make the surface
     fused = fuse_views(scene.cameras, masks, orientations, hull, waves, options, surface=surface)
+    if waves.coiled:
+        return stand_coils(hull, scalp_distance, growth, fused.tensor, fused.certainty)
     if options.segments is None:
         segments = find_segments(scene.cameras, masks, fused, hull, way, options)
     else:

@@ -20,6 +20,9 @@ from hairkit.parallel import compiled, compiled_with, parallel_for
 EMPTY, PERSON, HAIR, HIDDEN = 0, 1, 2, 3
 """Labels of pixels; as votes, PERSON means none, and HIDDEN hair of a view from which the head
 hides the cell."""
+BEYOND = 0.05
+"""Metres that hair may go on beyond a picture's sides or top that cut it off; hair may hang down
+farther. Without a bound wide hair became a star, deepest where the fewest views see."""
 
 
 class LabelledView(NamedTuple):
@@ -133,7 +136,8 @@ def add_votes(
                 z = origin[2] + (iz + 0.5) * cells.spacing
                 u, v, depth = project(camera, x, y, z)
                 if u < 0 or v < 0 or u >= width or v >= height:
-                    if not (near[ix, iy, iz] and _beyond_hair(u, v, labels.shape, edges)):
+                    reach = BEYOND * camera.focal / (1.0 if camera.orthographic else depth)
+                    if not (near[ix, iy, iz] and _beyond_hair(u, v, reach, labels.shape, edges)):
                         empty[ix, iy, iz] += 1
                     continue
                 vote = _vote(labels[int(v), int(u)], surface[int(v), int(u)], depth, margins)
@@ -147,11 +151,14 @@ def add_votes(
 
 @compiled_with(inside=True)
 def _beyond_hair(
-    u: float, v: float, shape: tuple[int, int], edges: tuple[bool, bool, bool, bool]
+    u: float, v: float, reach: float, shape: tuple[int, int], edges: tuple[bool, bool, bool, bool]
 ) -> bool:
-    """Return whether pixel u, v lies beyond one of the `edges` that hair touches."""
+    """Return whether pixel u, v lies beyond one of the `edges` that hair touches, and no more than
+    `reach` pixels beyond any but the lower one."""
     left, top, right, bottom = edges
     height, width = shape
+    if u < -reach or u >= width + reach or v < -reach:
+        return False
     return (u < 0 and left) or (v < 0 and top) or (u >= width and right) or (v >= height and bottom)
 
 

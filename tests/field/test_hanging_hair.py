@@ -3,10 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from hairkit.arrays import unit_vectors
 from hairkit.field.growth_prior import growth_potential, measure_scalp_distance
-from hairkit.field.hanging_hair import SAG, STANDS_OFF, hang_curls, hanging_axes, stand_coils
+from hairkit.field.hanging_hair import (
+    SAG,
+    SEEN_STIFFER,
+    STANDS_OFF,
+    STIFFER,
+    hang_curls,
+    hanging_axes,
+    stand_coils,
+)
 from hairkit.testing import ball_head, shell_hull
 from hairkit.types.volume import ScalpDistance
 
@@ -52,15 +61,19 @@ def test_the_field_is_signed_and_of_unit_length_in_the_loose_hull_only() -> None
     assert not length[~hull.loose].any()
 
 
-def test_coils_stand_off_the_scalp_and_sag_with_the_way_from_it() -> None:
-    """Straight out at the scalp; as far down as out at a way of `SAG` metres."""
+@pytest.mark.parametrize("times", STIFFER)
+def test_coils_stand_off_the_scalp_and_sag_as_the_photos_show(times: int) -> None:
+    """Straight out at the scalp; photos that show all directions but those along axes tell the
+    sag: as far down as out at a way of `SAG` metres and more."""
     hull = shell_hull()
     growth = growth_potential(hull, measure_scalp_distance(HEAD, hull))
     outward = unit_vectors(hull.grid.centres_of(hull.loose))
     for way, down in ((0.0, 0.0), (SAG, 1.0)):
         distance = ScalpDistance(np.full(hull.grid.shape, way, np.float32), SAG)
-        field = stand_coils(hull, distance, growth)
+        x, y, z = unit_vectors(outward - [0, down / (SEEN_STIFFER * times), 0]).T
+        across = np.stack([1 - x * x, 1 - y * y, 1 - z * z, -x * y, -x * z, -y * z], axis=1)
+        field = stand_coils(hull, distance, growth, across, np.ones(len(x), np.float32))
         assert field.direction is not None
-        wanted = unit_vectors(outward - [0, down, 0])
+        wanted = unit_vectors(outward - [0, down / times, 0])
         np.testing.assert_allclose(field.direction[hull.loose], wanted, atol=1e-5)
         assert not field.direction[~hull.loose].any()

@@ -82,7 +82,7 @@ def test_a_bald_crown_bears_no_roots(shift_px: float) -> None:
 
 
 def test_hair_grows_up_to_the_line_of_a_parting() -> None:
-    """A bare strip over the crown, narrow as a finger, closes; the forehead before it stays bare."""
+    """A bare strip over the crown, as narrow as a finger, closes; the forehead stays bare."""
     head = default_head()
     scene, scalp = scene_of(head), head.scalp > 0.5
     parted = scalp & (np.abs(head.vertices[:, 0]) < 0.004) & crown(head, 45.0)

@@ -10,6 +10,7 @@ from functools import cache
 import numpy as np
 import pytest
 from hairkit_plugins.visual_hull import MOST_HAIR, Options, build_hull
+from hairkit_plugins.visual_hull.carving import BEYOND
 from scipy import ndimage
 
 from hairkit.arrays import BoolArray, Float64Array
@@ -378,3 +379,17 @@ def test_the_same_masks_give_the_same_hull() -> None:
     first, second = (build_hull(scene, masks, COARSE) for _ in range(2))
     for name in ("dense", "loose", "head_distance"):
         assert getattr(first, name).tobytes() == getattr(second, name).tobytes()
+
+
+def test_wide_hair_that_pictures_cut_off_becomes_no_star() -> None:
+    """Pictures of the middle alone: hair goes on beyond them by `BEYOND`, whoever sees it not."""
+    half, (scene, masks) = 0.1, views_of(curtains)
+    left, right = (WIDTH // 2 + side * round(half / PIXEL) for side in (-1, 1))
+    cameras = [
+        replace(c, width=right - left, centre=(c.centre[0] - left, c.centre[1]))
+        for c in scene.cameras
+    ]
+    narrow = tuple(Mask(np.ascontiguousarray(mask.labels[:, left:right]), True) for mask in masks)
+    hull = build_hull(replace(scene, cameras=tuple(cameras)), narrow, COARSE)
+    across = np.linalg.norm(hull.grid.centres_of(hull.loose)[:, [0, 2]], axis=1)
+    assert half + BEYOND < across.max() < (half + BEYOND) / np.cos(np.pi / 8) * 1.2
