@@ -57,6 +57,8 @@ BAND = 3.0
 """Sigma between the two bands, texels of the coarse maps: 3 mm on the face."""
 SHARPNESS = 8
 """Power of the weights from which details are taken: nearly the best view alone."""
+WELL, OTHER_FACES = 0.3, 1e-6
+"""Weight from which a view sees the face well, and factor of the weights of others there."""
 BLOWN, BLOWN_FADE = 250.0, 6.0
 """Levels of 255 from which a pixel has lost its colour, and over which its weight fades."""
 LEAST_SHARE = 0.01
@@ -118,7 +120,7 @@ def photograph_skin(capture: Capture, scene: Scene, masks: Sequence[Mask]) -> Sk
         [view.coarse[::STEP, ::STEP] for view in views],
         [view.weight[::STEP, ::STEP] for view in views],
     )
-    blended, seen = _blend(views, photos, gains)
+    blended, seen = _blend(views, photos, gains, features)
     del views  # as much memory as the map itself
     blended = _delight(blended, seen, surface, features)
     seen = _certain(blended, seen, features)
@@ -253,12 +255,24 @@ def _usable(camera: Camera, mask: Mask, photo: UInt8Array) -> Float32Array:
 
 
 def _blend(
-    views: Sequence[_Seen], photos: Sequence[UInt8Array], gains: Float64Array
+    views: Sequence[_Seen],
+    photos: Sequence[UInt8Array],
+    gains: Float64Array,
+    features: BoolArray,
 ) -> tuple[Float32Array, Float32Array]:
-    """Return (S, S, 3) the blended colours and (C, C) the weight of all views together."""
+    """Return (S, S, 3) the blended colours and (C, C) the weight of all views together.
+
+    The face is of the view that sees its features best, as far as it sees it well: cameras are off
+    by millimetres, and two views would give two mouths.
+    """
     total = np.sum([view.weight for view in views], axis=0)
     best = np.maximum(np.max([view.weight for view in views], axis=0), LEAST)
-    shares = [(view.weight / best) ** SHARPNESS for view in views]
+    face = int(np.argmax([(view.weight * features).sum() for view in views]))
+    others = np.clip(1 - views[face].weight / WELL, OTHER_FACES, 1)
+    shares = [
+        (view.weight / best) ** SHARPNESS * (1 if k == face else others)
+        for k, view in enumerate(views)
+    ]
     shares = [np.where(share < LEAST_SHARE, 0, share) for share in shares]
     share_sum = np.maximum(np.sum(shares, axis=0), LEAST)
     shares = [np.asarray(share / share_sum, np.float32) for share in shares]
