@@ -52,6 +52,8 @@ DISTANCE, GROWTH = 3, 4
 """Channels of internal distance and growth potential after the three of the direction."""
 MAX_LENGTH = 1.2
 """Metres of the longest strand."""
+BLIND = 0.5
+"""Share of the way to the tips on which nothing ends a strand at most."""
 LEFT, BELOW = 1.1, -0.5
 """Internal distance at which a strand that stands out of the hair's side or top has left it, and
 the upward part of the surface's normal below them. Tips of true strands are at 1.00 to 1.09 there
@@ -331,7 +333,7 @@ def _grow_strand(
     for i in range(1, limits[0] + 1):
         sample_at(volume.origin, volume.spacing, volume.values, p, found)
         known = make_unit(found[:3])
-        if i <= rules.blind_steps or (
+        if i <= min(rules.blind_steps, BLIND * limits[1]) or (
             known and found[DISTANCE] <= (LEFT if stands else rules.bound)
         ):
             inside = i
