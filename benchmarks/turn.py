@@ -8,8 +8,8 @@ python benchmarks/turn.py captures/ --scores  # F of whole runs
 Faces and persons are those of the capture (landmarks.json, masks/) unless `--photos-alone` asks the
 networks (`hairkit models install`). Names of files are ignored. A turn counts as found when no
 photo is more than 30 degrees off; the true turn is in truth/. `--cameras` judges turns by their
-cameras, as a run does: those of all photos, and of all but one, on photos alone. `--seconds` prints
-instead what whole runs on 3 to 36 of the photos of one turn take, `--scores` how well whole runs on
+cameras, as a run does: those of all photos, and of all but one, on photos alone, shuffled.
+`--seconds` prints instead what whole runs on 3 to 36 of the photos of one turn take, `--scores` how well whole runs on
 the photos alone score in each order.
 """
 
@@ -108,15 +108,18 @@ def main() -> None:
 def print_judged(captures: Path) -> None:
     """Print how many turns, whole and with a photo left out, are in order, and with cameras.
 
+    Photos are given in random orders, since files in that of the turn are evidence.
+
     "Silent" ones are wrong after all, with a margin of 1.25 and more. Seconds are the processor's.
     """
     matte = make_options(auto_matte.Options, {}, "auto_matte")
+    generator = np.random.default_rng(0)
     print("| capture | turns | in order | with cameras | silent | margin | with cameras | s each |")
     print("|---|---|---|---|---|---|---|---|")
     for folder in sorted(path.parent for path in captures.glob("*/truth")):
         photos, cells, spent = _photos(folder, True), [], 0.0
         for out in range(-1, len(photos)):
-            chosen = [photo for k, photo in enumerate(photos) if k != out]
+            chosen = [photos[k] for k in generator.permutation(len(photos)) if k != out]
             _, turn = _errors(chosen)
             if turn is None:
                 continue
