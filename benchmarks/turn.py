@@ -9,8 +9,8 @@ Faces and persons are those of the capture (landmarks.json, masks/) unless `--ph
 networks (`hairkit models install`). Names of files are ignored. A turn counts as found when no
 photo is more than 30 degrees off; the true turn is in truth/. `--cameras` judges turns by their
 cameras, as a run does: those of all photos, and of all but one, on photos alone, shuffled.
-`--seconds` prints instead what whole runs on 3 to 36 of the photos of one turn take, `--scores` how well whole runs on
-the photos alone score in each order.
+`--seconds` prints instead what whole runs on 3 to 36 of the photos of one turn take, `--scores` how
+well whole runs on the photos alone score in each order.
 """
 
 from __future__ import annotations
