@@ -149,7 +149,7 @@ class Search:
                 if damping > MOST_DAMPING:
                     break
                 continue
-            settled = fit.cost - trial.cost < SETTLED * fit.cost
+            settled = fit.cost - trial.cost < SETTLED * (10 if noise > 1 else 1) * fit.cost
             fit, here, damping = trial, there, damping / 5
             if settled:
                 break
