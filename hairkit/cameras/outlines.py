@@ -79,7 +79,7 @@ class Outlines:
     @cached_property
     def rough(self) -> Outlines:
         """Those with every second contour point, for searches whose outlines are blurred anyway."""
-        return replace(self.halved, points=self.points[::2], views=self.views[::2])
+        return replace(self.halved, points=self.points[::2].copy(), views=self.views[::2].copy())
 
     def arranged(self, order: Int64Array) -> Outlines:
         """Return the outlines with the views in another order."""
