@@ -83,10 +83,10 @@ class Outlines:
 
     def arranged(self, order: Int64Array) -> Outlines:
         """Return the outlines with the views in another order."""
-        mine = [np.flatnonzero(self.views == view) for view in order]
-        views = np.repeat(np.arange(len(order)), [len(each) for each in mine])
-        points = self.points[np.concatenate(mine)]
-        return replace(self, fields=self.fields[order], points=points, views=views)
+        views = np.argsort(order)[self.views]
+        mine = np.argsort(views, kind="stable")
+        fields, points = self.fields[order], self.points[mine]
+        return replace(self, fields=fields, points=points, views=views[mine])
 
     def crowns(self, ratio: float) -> tuple[Float64Array, Float64Array, Float64Array]:
         """Return each silhouette's top row, and middle column and width `ratio` widths below it.
@@ -159,5 +159,4 @@ def _to_edge(field: Float32Array, points: Float64Array) -> Float64Array:
     column, row = points.astype(int).T
     gradient = np.stack([column_slope[row, column], row_slope[row, column]], axis=1)
     length = np.maximum((gradient**2).sum(1, keepdims=True), LEAST_SLOPE)
-    moved: Float64Array = points - field[row, column][:, None] * gradient / length
-    return moved
+    return np.asarray(points - field[row, column][:, None] * gradient / length)
