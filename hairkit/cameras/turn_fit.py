@@ -276,7 +276,7 @@ class TurnFit:
 
         Then their right sides, and what the rays that miss cost.
         """
-        outlines = self.outlines.rough if coarseness > 1 else self.outlines.halved
+        outlines = self.outlines.rough if coarseness > 1 else self.outlines
         noise = coarseness * self.noise
         each = len(self.outlines.points) / max(len(outlines.points), 1)
         value, slope = self._coherence(vector, cameras, noise, outlines)
