@@ -194,8 +194,7 @@ class LandmarkFit:
         """Return each sight's distance from where it should be (N,), pixels."""
         sights = self.sights
         pixels, _, _ = self.project(sights.point, sights.view, offset, cameras)
-        result: Float64Array = np.linalg.norm(sights.pixel - pixels, axis=1)
-        return result
+        return np.asarray(np.linalg.norm(sights.pixel - pixels, axis=1))
 
     def equations(
         self, offset: Float64Array, cameras: CameraArrays, tangents: Float64Array
@@ -302,8 +301,7 @@ def shape_precision(landmarks: Float64Array) -> Float64Array:
 
 def soft_l1_weight(scaled: Float64Array) -> Float64Array:
     """Return the weights of soft-L1 for residuals over their noise."""
-    weights: Float64Array = 1 / np.sqrt(1 + (scaled / SOFT_L1_BEND) ** 2)
-    return weights
+    return np.asarray(1 / np.sqrt(1 + (scaled / SOFT_L1_BEND) ** 2))
 
 
 def soft_l1_cost(scaled: Float64Array, share: Float64Array | float = 1.0) -> float:

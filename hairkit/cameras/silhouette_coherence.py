@@ -196,8 +196,7 @@ def _ruled_out(lines: Float64Array, view: int, z: float, short: float) -> float:
     rest = lines[view, FASTEST] - short * depth * lines[view, DEPTH]
     if rest <= 0:
         return FOREVER
-    result: float = short * depth * depth / rest
-    return result
+    return float(short * depth * depth / rest)
 
 
 @compiled_with(inside=True)
@@ -211,14 +210,13 @@ def _soft_distance(
     """
     least = CAP
     for view in range(len(lines)):
-        distance[view] = CAP if view == own else _distance(views, lines, view, z)
+        distance[view] = CAP if view == own else _sample(views, lines, view, z)[0]
         least = min(least, distance[view])
     total = 0.0
     for view in range(len(lines)):
         if view != own:
             total += np.exp((least - distance[view]) / views.softness)
-    result: float = least - views.softness * np.log(total / 2.0)
-    return result
+    return float(least - views.softness * np.log(total / 2.0))
 
 
 @compiled_with(inside=True)
@@ -231,21 +229,15 @@ def _smallest_distance(
     """
     best, nearest = CAP, likely
     if likely != own:
-        best = _distance(views, lines, likely, z)
+        best = _sample(views, lines, likely, z)[0]
     for view in range(len(lines)):
         if best < bar:
             break
         if view != own and view != likely:
-            here = _distance(views, lines, view, z)
+            here = _sample(views, lines, view, z)[0]
             if here < best:
                 best, nearest = here, view
     return best, nearest
-
-
-@compiled
-def _distance(views: _Views, lines: Float64Array, view: int, z: float) -> float:
-    """Return the signed distance of a point on a ray to a view's silhouette, pixels."""
-    return _sample(views, lines, view, z)[0]
 
 
 @compiled

@@ -139,8 +139,7 @@ def _neck(head: Head) -> Float64Array:
     """Return the middle (3,) of the lowest part of the head's mesh."""
     height = head.vertices[:, 1]
     lowest = head.vertices[height < height.min() + NECK_SLICE].astype(np.float64)
-    middle: Float64Array = lowest.mean(axis=0)
-    return middle
+    return np.asarray(lowest.mean(axis=0))
 
 
 def judge_drawn_directions(

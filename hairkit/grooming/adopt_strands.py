@@ -104,8 +104,7 @@ def plain_widths(thickness: npt.NDArray[Any], metres: float, source: object) -> 
     limit = REACH / metres
     if not (thickness <= limit).all():  # so NaN is refused too
         raise FormatError(f"{source}: a thickness is no number, or wider than {REACH:g} m")
-    widths: Float32Array = np.maximum(thickness, 0).astype(np.float32) * np.float32(metres)
-    return widths
+    return np.asarray(np.maximum(thickness, 0).astype(np.float32) * np.float32(metres))
 
 
 def adopt(

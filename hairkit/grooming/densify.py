@@ -201,8 +201,7 @@ def _between_guides(bundle: _Bundle, count: int, generator: np.random.Generator)
     chosen = generator.integers(len(bundle.roots), size=count)
     near = _neighbours(bundle, bundle.roots[chosen], 4)[1]
     weights = generator.dirichlet(np.ones(near.shape[1]), size=count).astype(np.float32)
-    mixed: Float32Array = np.einsum("nk,nkc->nc", weights, bundle.roots[near])
-    return mixed
+    return np.asarray(np.einsum("nk,nkc->nc", weights, bundle.roots[near]))
 
 
 def _neighbours(
@@ -261,8 +260,7 @@ def _mix_courses(bundle: _Bundle, mix: _Mix) -> Float32Array:
 
 def _shape_lengths(shapes: Float32Array) -> Float64Array:
     steps = np.diff(shapes, axis=1)
-    result: Float64Array = np.sqrt(np.einsum("sic,sic->si", steps, steps)).sum(axis=1)
-    return result
+    return np.asarray(np.sqrt(np.einsum("sic,sic->si", steps, steps)).sum(axis=1))
 
 
 def _lay_in_locks(

@@ -151,8 +151,7 @@ def _smooth_along(values: Float64Array, real: BoolArray) -> Float64Array:
     """Return values (N, M) of points smoothed along their ways, by the real (N, M) ones alone."""
     total = ndimage.gaussian_filter1d(np.where(real, values, 0), SMOOTH_STEPS, 1, mode="constant")
     weight = ndimage.gaussian_filter1d(real.astype(float), SMOOTH_STEPS, 1, mode="constant")
-    smooth: Float64Array = total / np.maximum(weight, 1e-9)
-    return smooth
+    return np.asarray(total / np.maximum(weight, 1e-9))
 
 
 def _thickness(points: Float64Array, hull: Hull) -> Float64Array:
@@ -168,8 +167,7 @@ def _thickness(points: Float64Array, hull: Hull) -> Float64Array:
         filled = np.minimum(filled, hull.grid.sample(hair, points + height * outward))
         thickness += MARCH * filled
     usual = THICK_SPREAD * float(np.percentile(thickness, THICK_PERCENTILE))
-    result: Float64Array = np.minimum(thickness, usual)
-    return result
+    return np.asarray(np.minimum(thickness, usual))
 
 
 def _places_in_section(ways: Float64Array, last: Int64Array, tail: Tail) -> Float64Array:
@@ -227,8 +225,7 @@ def _outward(hull: Hull, points: Float64Array) -> Float64Array:
 
 
 def _tangent(vector: Float64Array, outward: Float64Array) -> Float64Array:
-    tangent: Float64Array = vector - np.einsum("ij,ij->i", vector, outward)[:, None] * outward
-    return tangent
+    return np.asarray(vector - np.einsum("ij,ij->i", vector, outward)[:, None] * outward)
 
 
 def plait(u: float, v: float, tail: Tail) -> Float64Array:

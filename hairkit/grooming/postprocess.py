@@ -86,8 +86,7 @@ def _across(points: Float32Array, move: Float32Array | Float64Array) -> Float64A
     """Return the part of moves (S, M, 3) across the strands (S, M, 3): none is shortened."""
     tangent = np.gradient(points.astype(np.float64), axis=1)
     tangent /= np.maximum(np.linalg.norm(tangent, axis=2, keepdims=True), 1e-12)
-    across: Float64Array = move - (move * tangent).sum(axis=2, keepdims=True) * tangent
-    return across
+    return np.asarray(move - (move * tangent).sum(axis=2, keepdims=True) * tangent)
 
 
 def _depth(hull: Hull) -> Float32Array:

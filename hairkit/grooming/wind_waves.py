@@ -63,8 +63,7 @@ def grown_share(arc: Float32Array | Float64Array, waves: Waves) -> Float64Array:
     >>> grown_share(np.array([0, 0.01]), Waves(0.004, 0.01)).tolist()
     [0.0, 1.0]
     """
-    share: Float64Array = np.clip(arc / min(RAMP, waves.pitch), 0, 1)
-    return share
+    return np.asarray(np.clip(arc / min(RAMP, waves.pitch), 0, 1))
 
 
 def _transport_frames(points: Float64Array) -> tuple[Float64Array, Float64Array]:

@@ -101,8 +101,7 @@ def _resized(photo: HairPrior) -> Float32Array:
     size = photo.bare.shape[::-1]
     large = cv2.resize(photo.probability, size, interpolation=cv2.INTER_CUBIC)
     positive = np.clip(np.asarray(large, np.float32), np.float32(_LEAST_PROBABILITY), 1)
-    result: Float32Array = positive / positive.sum(axis=-1, keepdims=True)
-    return result
+    return np.asarray(positive / positive.sum(axis=-1, keepdims=True))
 
 
 def _of_classes(probability: Float32Array, region: Float32Array, share: float) -> Float32Array:
@@ -145,5 +144,4 @@ def _weigh(
     relative = evidence - fold_last(np.maximum, evidence)[..., None]
     relative = np.maximum(relative, np.float32(-settings.evidence_cap))
     odds = prior * np.exp(blur(relative, _SMOOTH_SIGMA))
-    result: Float32Array = odds / fold_last(np.add, odds)[..., None]
-    return result
+    return np.asarray(odds / fold_last(np.add, odds)[..., None])

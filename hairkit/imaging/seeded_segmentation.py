@@ -158,8 +158,7 @@ def coarse_labels(
         probability = _probability(evidence, prior, seeds, classes, hair_allowed, settings)
         labels = np.take(np.asarray(classes, np.uint8), probability.argmax(axis=-1))
         known = _certain(labels, probability.max(axis=-1), seeds)
-    result: UInt8Array = labels
-    return result
+    return np.asarray(labels)
 
 
 def label_from_probability(
@@ -237,8 +236,7 @@ def _weigh_colours(
 
 def fold_last(combine: np.ufunc, values: Float32Array) -> Float32Array:
     """Return (...) the K values (..., K) combined: much faster than a reduction of a few."""
-    result: Float32Array = functools.reduce(combine, np.moveaxis(values, -1, 0))
-    return result
+    return np.asarray(functools.reduce(combine, np.moveaxis(values, -1, 0)))
 
 
 def _standard_features(
