@@ -36,11 +36,11 @@ HEADER = 24
 """Height of the line of view names, pixels."""
 HEALTH_LINE = 20
 """Height of a line of health, pixels."""
-HAIRS = 1500
+HAIRS = 2500
 """Strands of the hair in the last row: a pixel of a tile is millimetres wide."""
 LEAST_WIDTH = 920
 """Width of a sheet of few photos, pixels, for the lines of health."""
-WIDER = np.float32(4)
+WIDER = np.float32(3)
 """Factor of their width: they stand for all of the hair."""
 HAIR_POINTS = 20
 """Points of each of them."""
@@ -198,7 +198,6 @@ def _hair_pictures(groom: Groom, cameras: Sequence[Camera]) -> list[UInt8Array]:
         material=groom.material,
         lights=_lights(),
         bust=True,
-        supersample=SUPERSAMPLE,
         skin=LOOK,
     )
 
