@@ -37,18 +37,10 @@ class Options:
         48.65, low=5, high=90, unit="deg", doc="A sharper turn in one step is uncertain (theta)."
     )
     max_score: int = option(
-        4,
-        low=2,
-        high=100,
-        doc="Score of a certain step, which takes 1 off: one more than the"
-        " uncertain steps in a row that end a strand.",
+        4, low=2, high=100, doc="One more than the uncertain steps in a row that end a strand."
     )
     bend_deg: float = option(
-        50.0,
-        low=0,
-        high=90,
-        unit="deg",
-        doc="Angle by which the scalp's normal is bent down for the first direction (G).",
+        50.0, low=0, high=90, unit="deg", doc="How far normals are bent down to begin with (G)."
     )
     max_length: float = option(1.2, low=0.01, high=5, unit="m", doc="Longest strand.")
     smoothing: int = option(5, low=0, high=50, doc="Passes of the smoothing filter.")
@@ -56,10 +48,7 @@ class Options:
         0.002, low=1e-5, high=0.1, unit="m", doc="Length that a pass smooths over (alpha)."
     )
     u_share: float = option(
-        0.3,
-        low=0,
-        high=1,
-        doc="Share of upward steps that marks a U-shaped strand (mu); 1 never trims.",
+        0.3, low=0, high=1, doc="Share of upward steps that marks a U (mu); 1 never trims."
     )
     points: int = option(64, low=2, high=255, doc="Points of every strand; equal segments.")
     clearance: float = option(0.001, low=0, high=0.02, unit="m", doc="Distance kept from the head.")

@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy import ndimage
+from scipy.spatial import cKDTree
 
 from hairkit import (
     Hull,
@@ -34,7 +35,7 @@ from hairkit import (
     hookimpl,
 )
 from hairkit.arrays import Float32Array, Float64Array, Int64Array, for_kernel
-from hairkit.field.growth_prior import hair_way, long_share
+from hairkit.field.growth_prior import hair_ways
 from hairkit.field.sampling_kernels import copy_point, gradient_at, make_unit, sample_at
 from hairkit.grooming.cover_hair import find_bare_cells, lead_to_roots, spread_seeds
 from hairkit.grooming.postprocess import FinishOptions, finish
@@ -75,61 +76,34 @@ class Options(FinishOptions):
         1.6, low=1, high=10, doc="Internal distance at which a strand has left the hair below."
     )
     reach: float = option(
-        2.0,
-        low=0.1,
-        high=5,
-        doc="Strands grow no longer than this share of the way through the hair: the longest,"
-        " in short hair one that follows from its height.",
+        2.0, low=0.1, high=5, doc="Greatest length of a strand over the way through the hair."
     )
     patience: float = option(
-        0.012,
-        low=0,
-        high=0.1,
-        unit="m",
-        doc="Length on which a strand may run outside the hair before it ends where it left it.",
+        0.012, low=0, high=0.1, unit="m", doc="Way outside the hair that ends no strand."
     )
     blind: float = option(
         0.02, low=0, high=0.2, unit="m", doc="Length from the root on which nothing ends a strand."
     )
     slide_sine: float = option(
-        0.35,
-        low=0,
-        high=1,
-        doc="Strands that leave the hair at an angle of a smaller sine slide along its surface;"
-        " 0 never.",
+        0.35, low=0, high=1, doc="Sine of the angle up to which strands slide on leaving; 0 never."
     )
     slide_from: float = option(
         1.0, low=0, high=10, doc="Internal distance from which strands slide."
     )
     pull: float = option(
-        1.0,
-        low=0,
-        high=10,
-        doc="Sine of the angle by which a sliding strand turns back, for each unit of internal"
-        " distance beyond slide_from.",
+        1.0, low=0, high=10, doc="Sine of the turn back for each unit beyond slide_from."
     )
     turn_sine: float = option(
-        0.7,
-        low=0,
-        high=1,
-        doc="Strands that meet the shoulders turn along them where the way to the tips leads along"
-        " the surface: at an angle of a larger sine to its normal; 1 never.",
+        0.7, low=0, high=1, doc="Sine above which strands turn along the shoulders; 1 never."
     )
     inertia: float = option(
         0.9, low=0, high=0.99, doc="Share of the previous direction in the next step's."
     )
     cover: float = option(
-        2.0,
-        low=0,
-        high=10,
-        doc="Density, against the mean, of strands led through hair that photos show and no strand"
-        " reaches; 0: none.",
+        2.0, low=0, high=10, doc="Density of strands led to hair that none reaches; 0 for none."
     )
     wave_share: float = option(
-        0.18,
-        low=0,
-        high=1,
-        doc="Strands of wavy hair remember their direction for at least this share of the pitch.",
+        0.18, low=0, high=1, doc="Share of a wave's pitch over which strands keep direction."
     )
 
 
@@ -146,22 +120,24 @@ def track(
     options: Options,
 ) -> Strands:
     """Grow one strand from every root."""
-    way = hair_way(hull, roots, scalp_distance.hair_length)
+    longest = scalp_distance.hair_length
+    ways = hair_ways(hull, field.growth, roots, longest, scene.one_sided)
     memory = options.wave_share * waves.pitch
     if memory > options.step:
         inertia = max(options.inertia, 1 - options.step / memory)
         options = replace(options, inertia=inertia)
     volume = signed_volume(field, _sign_directions(field), _distance(field, hull))
     shoulders = float(Torso.under(scene.head).joint[1])
-    strands = grow(field, volume, roots.positions, way, options, shoulders)
+    strands = grow(field, volume, roots.positions, ways, options, shoulders)
     if options.cover > 0 and not tied.tails:
         bare = find_bare_cells(strands, hull, masks, scene.cameras, scene.head)
         seeds = spread_seeds(bare, hull, options.cover * len(strands))
         if len(seeds):
-            back = grow(field, volume, seeds, way, options, shoulders, -1.0, early=0)
-            ahead = grow(field, volume, seeds, way, options, shoulders, early=0)
-            ways = (s.points.reshape(len(seeds), -1, 3) for s in (back, ahead))
-            strands = lead_to_roots(strands, roots.positions, *ways)
+            ways = ways[cKDTree(roots.positions).query(seeds)[1]]
+            back = grow(field, volume, seeds, ways, options, shoulders, -1.0, early=0)
+            ahead = grow(field, volume, seeds, ways, options, shoulders, early=0)
+            led = (s.points.reshape(len(seeds), -1, 3) for s in (back, ahead))
+            strands = lead_to_roots(strands, roots.positions, *led)
     return finish(replace(strands, root_uv=roots.uv), waves, tied, hull, field, options)
 
 
@@ -169,7 +145,7 @@ def grow(
     field: OrientationField,
     volume: SignedVolume,
     starts: Float32Array,
-    way: float,
+    ways: Float64Array,
     options: Options,
     shoulders: float = -np.inf,
     sign: float = 1.0,
@@ -179,9 +155,8 @@ def grow(
 
     Parameters
     ----------
-    way
-        Longest way from the scalp through the hair, metres. Strands slide only up to this length,
-        or up to that of the way from their root to the tips, by the growth potential.
+    ways
+        (N,) longest way from the scalp through the hair, metres. Strands slide only that far.
     shoulders
         Height below which strands that leave the hair may have met the shoulders, metres.
     sign
@@ -189,8 +164,6 @@ def grow(
     early
         Share of the way on which no strand ends by standing out of the hair.
     """
-    left = -field.grid.sample(field.growth, starts).astype(np.float64)
-    ways = way + long_share(way) * np.maximum(left - way, 0)
     steps = np.maximum(np.minimum(MAX_LENGTH, options.reach * ways) / options.step, 2)
     limits = np.stack([steps, ways / options.step], axis=1).astype(np.int64)
     points = np.zeros((len(starts), options.points, 3), np.float32)

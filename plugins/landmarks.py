@@ -29,11 +29,7 @@ class Options:
         "orthographic", choices=("orthographic", "perspective"), doc="Kind of the nominal cameras."
     )
     focal_equivalent: float = option(
-        42.0,
-        low=10,
-        high=1000,
-        doc="Focal length for perspective without EXIF, full frame.",
-        unit="mm",
+        42.0, low=10, high=1000, unit="mm", doc="For perspective without EXIF, full frame."
     )
     distance: float = option(
         0.7, low=0.1, high=20, doc="Usual distance of perspective cameras.", unit="m"

@@ -20,11 +20,7 @@ class Options:
         "perspective", choices=("orthographic", "perspective"), doc="Kind of the nominal cameras."
     )
     focal_equivalent: float = option(
-        42.0,
-        low=10,
-        high=1000,
-        doc="Focal length without EXIF or capture.toml, full frame.",
-        unit="mm",
+        42.0, low=10, high=1000, unit="mm", doc="Without EXIF or capture.toml, full frame."
     )
     distance: float = option(
         0.7, low=0.1, high=20, doc="From the cameras to the turn's centre.", unit="m"

@@ -44,11 +44,7 @@ class Options:
 
     min_views: int = option(2, low=2, high=8, doc="Views that a cell needs to be fused.")
     box: int = option(
-        5,
-        low=1,
-        high=31,
-        unit="px",
-        doc="Edge of the box over which confidence is averaged; a view's weight is its square.",
+        5, low=1, high=31, unit="px", doc="Edge of the box over which confidence is averaged."
     )
     tolerance: float = option(1e-4, low=1e-8, high=0.1, doc="Relative residual of the solver.")
 

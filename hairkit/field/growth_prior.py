@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from scipy.spatial import cKDTree
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array, unit_vectors
 from hairkit.field.cell_shells import dilate_cells
@@ -47,8 +48,8 @@ WAY_OF_HEIGHT = 1.3
 true one with photos alone. Hair that stands needs 0.9 to 1, hair that lies flat 1.3 to 1.6."""
 LOWER_QUARTILE = 0.25
 """Of the heights: the median would be 1.3 to 2 of it, most where outlines fit badly."""
-PROBES = 2000
-"""Roots over which the height is measured."""
+PROBES, AROUND = 2000, 60
+"""Roots over which the height is measured; those within about 2 cm of one."""
 FLOW_SMOOTHING = 2.0
 """Standard deviation in cells that makes the chamfer distance's gradient smooth."""
 LENGTH_PERCENTILE = 98
@@ -116,7 +117,7 @@ def _comb(
     """Return the combing direction (N, 3) at points where normals and flow (N, 3) are known."""
     flow = flow - np.sum(flow * outward, axis=1, keepdims=True) * outward
     share = long_share(hair_length)
-    combed = share * flow + max(1 - share, LEAST_WHORL) * _from_crown(head, at, outward)
+    combed = share * flow + max(1 - share, LEAST_WHORL) * whorl_direction(head, at, outward)
     combed /= np.maximum(np.linalg.norm(combed, axis=1, keepdims=True), 1e-6)
     if parts(parting, hair_length):
         crown = crown_share(parting, head, at)[:, None]
@@ -183,7 +184,8 @@ def mix_directions(
     data[cells] = (1 - share) * data[cells] + share * outer_products(direction)
 
 
-def _from_crown(head: Head, at: Float64Array, outward: Float64Array) -> Float64Array:
+def whorl_direction(head: Head, at: Float64Array, outward: Float64Array) -> Float64Array:
+    """Return the tangents (N, 3) at points (N, 3), with normals, of short hair from the crown."""
     top = head.vertices[np.argmax(head.vertices[:, 1])].astype(np.float64)
     away = at - (top - [0, 0, WHORL_BEHIND])
     away[:, 1] = 0
@@ -237,12 +239,15 @@ def long_share(length: float) -> float:
     return float(np.clip((length - SHORT_HAIR) / (LONG_HAIR - SHORT_HAIR), 0.0, 1.0))
 
 
-def hair_way(hull: Hull, roots: Roots, longest: float) -> float:
-    """Return the way through the hair that strands may need, from its longest way, metres.
+def hair_ways(
+    hull: Hull, growth: Float32Array, roots: Roots, longest: float, guessed: bool = False
+) -> Float64Array:
+    """Return the ways through the hair (N,) that strands may need, from its longest way, metres.
 
-    In long hair that is the longest. Short hair ends everywhere, and its longest way is that of the
-    tuft that stands off most, or where the outlines fit worst. There it is `WAY_OF_HEIGHT` of the
-    lower quartile of the hull's height over the roots, since hulls are too thick, never too thin.
+    In long hair that is the longest, or the root's own by the growth potential (X, Y, Z). Short
+    hair ends everywhere, and its longest way is that of the tuft that stands off most, or where the
+    outlines fit worst. There it is `WAY_OF_HEIGHT` of the lower quartile of the hull's height over
+    the roots, since hulls are too thick, never too thin; over the nearest where it is `guessed`.
     """
     share = long_share(longest)
     heights = np.arange(0, LONG_HAIR, hull.grid.spacing / 2)
@@ -251,10 +256,16 @@ def hair_way(hull: Hull, roots: Roots, longest: float) -> float:
     above = (start + heights[:, None] * normal).reshape(-1, 3)
     dense = hull.grid.sample(hull.dense.astype(np.float32), above) > 0.5
     height = (dense.reshape(-1, len(heights)) * heights).max(axis=1)
-    if share == 1 or not height.any():
-        return longest
-    low = float(np.quantile(height[height > 0], LOWER_QUARTILE))
-    return share * longest + (1 - share) * WAY_OF_HEIGHT * low
+    known = height > 0
+    left = np.maximum(-hull.grid.sample(growth, roots.positions).astype(np.float64), longest)
+    if share == 1 or not known.any():
+        return left
+    some = height[known][None]
+    if guessed:
+        near = cKDTree(start[known, 0]).query(roots.positions, k=min(AROUND, some.size))[1]
+        some = some[0, near.reshape(len(roots), -1)]
+    low = np.quantile(some, LOWER_QUARTILE, axis=1)
+    return np.asarray(share * left + (1 - share) * WAY_OF_HEIGHT * low)
 
 
 def chamfer_distance(occupied: BoolArray, start: BoolArray, spacing: float) -> Float32Array:

@@ -150,6 +150,11 @@ def _across_hairline(sight: ScalpSight, head: Head) -> float:
     return front.agreement(forward)
 
 
+def fringe_share(masks: Sequence[Mask], cameras: Sequence[Camera], head: Head) -> float:
+    """Return 0 where the forehead is bare, 1 where a fringe lies on it: of any length."""
+    return _share(forehead_covered(masks, cameras, head), MOST_BARE, LEAST_COVERED)
+
+
 def forehead_covered(masks: Sequence[Mask], cameras: Sequence[Camera], head: Head) -> float:
     """Return the share of the forehead below the hairline that the views see as hair."""
     scalp = head.vertices[head.scalp > 0.5]

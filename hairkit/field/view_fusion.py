@@ -46,11 +46,7 @@ class FusionOptions:
     """Options of every field method that fuses views; plugins inherit them."""
 
     see_through: float = option(
-        0.02,
-        low=0,
-        high=0.2,
-        unit="m",
-        doc="Depth behind the first hair at which a view's weight falls to 1/e; 0: visible only.",
+        0.02, low=0, high=0.2, unit="m", doc="Depth at which a view's weight is 1/e; 0: front only."
     )
     free_depth: float = option(
         0.006, low=0, high=0.05, unit="m", doc="Depth behind the first hair that costs no weight."
@@ -59,10 +55,7 @@ class FusionOptions:
         True, doc="Take off the slant that the near halves of waves show in every view."
     )
     pool: float = option(
-        0.15,
-        low=0,
-        high=1,
-        doc="Gaussian, as a share of the waves' pitch, over which planes of wavy hair are pooled.",
+        0.15, low=0, high=1, doc="Gaussian over which planes of waves are pooled, in pitches."
     )
 
 

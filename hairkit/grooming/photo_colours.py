@@ -113,7 +113,7 @@ def with_hues(
     """Return the groom in the hues that the photos show along its strands, as bright as before.
 
     The material has the medians over the inner and the outer halves of the strands. Hair of several
-    hues has a colour at every point.
+    hues has a colour at every point; one photo does not tell them from coloured light.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def with_hues(
     tree = cKDTree(places[seen])
     hue = _hue(_smooth(tree, found, places[seen]))
     away = np.abs(hue - np.median(hue, axis=0)).max(axis=1)
-    if (away > TELLING).mean() < LEAST:
+    if len(views) == 1 or (away > TELLING).mean() < LEAST:
         return groom
     _log.warning("the hair has several hues: it is dyed, or masks take something else for hair")
     return replace(groom, strands=replace(strands, colours=_dyed(groom, tree, found)))

@@ -14,8 +14,7 @@ from typing import Any
 from hairkit.cameras.similarity import move_head
 from hairkit.field.find_parting import measure_parting
 from hairkit.field.find_ties import measure_ties
-from hairkit.field.growth_prior import measure_scalp_distance
-from hairkit.field.unseen import group_seen
+from hairkit.field.unseen import group_seen, measure_ways
 from hairkit.grooming.assemble import assemble_groom
 from hairkit.head_model.hairline import measure_hairline
 from hairkit.head_model.photo_skin import photograph_skin
@@ -257,7 +256,10 @@ class Findings:
     @result_of(DISTANCE)
     def scalp_distance(self) -> Given[ScalpDistance]:
         """Ways through the hull to the scalp."""
-        return self.run.derive(DISTANCE, measure_scalp_distance, head=self.head, hull=self.hull)
+        return self.run.derive(
+            DISTANCE, measure_ways, scene=self.scene, hull=self.hull, masks=self.masks,
+            orientations=self.orientations,
+        )  # fmt: skip
 
     @result_of(WAVES)
     def measured_waves(self) -> Given[Waves]:

@@ -35,11 +35,7 @@ class Nudge:
         (0.0, 0.0), low=-2, high=2, doc="To the right and down, as shares of width and height."
     )
     turn_deg: tuple[float, float, float] = option(
-        (0.0, 0.0, 0.0),
-        low=-180,
-        high=180,
-        doc="About the axes to the right, down, and away from the camera.",
-        unit="deg",
+        (0.0, 0.0, 0.0), low=-180, high=180, unit="deg", doc="About the axes right, down, forward."
     )
     factor: float = option(1.0, low=0.2, high=5, doc="Growth of the head.")
 

@@ -38,11 +38,7 @@ class NodeOptions:
         0.002, low=0.0, high=0.02, unit="m", doc="Least distance between hair and head."
     )
     depenetration: float = option(
-        0.5,
-        low=0.01,
-        high=10.0,
-        unit="m/s",
-        doc="Highest speed at which penetrations are resolved.",
+        0.5, low=0.01, high=10.0, unit="m/s", doc="Highest speed that resolves penetrations."
     )
     grab_speed: float = option(
         5.0, low=0.1, high=50.0, unit="m/s", doc="Highest speed of a grabbed point."

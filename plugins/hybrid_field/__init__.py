@@ -50,6 +50,7 @@ from hairkit.field.growth_prior import (
     long_share,
 )
 from hairkit.field.hanging_hair import hang_curls, stand_coils
+from hairkit.field.scalp_comb import fringe_share
 from hairkit.field.unseen import add_flow
 from hairkit.field.view_fusion import fuse_views
 from hairkit.parallel import thread_count
@@ -88,7 +89,8 @@ def solve_field(
     length = scalp_distance.hair_length
     way = Way(growth, scene.head, parting, length)
     part = scene.one_sided
-    surface = part * long_share(length)  # short hair stands off, and its ends make the surface
+    lies = max(long_share(length), fringe_share(masks, scene.cameras, scene.head))
+    surface = part * lies  # other short hair stands off, and its ends make the surface
     fused = fuse_views(scene.cameras, masks, orientations, hull, waves, options, surface=surface)
     if waves.coiled:
         return stand_coils(hull, scalp_distance, growth, fused.tensor, fused.certainty)

@@ -72,11 +72,7 @@ class Options:
         16, low=0, high=1000, doc="Width of the blend between two of them.", unit="px"
     )
     blur: float | None = option(
-        None,
-        low=0.0,
-        high=100.0,
-        doc="Gaussian that makes the source of an example without one; none finds it.",
-        unit="px",
+        None, low=0.0, high=100.0, unit="px", doc="Gaussian for an example without a source."
     )
     close_up: Path | None = option(
         None, doc="Picture of sharp skin that the texture of a reconstruction follows."

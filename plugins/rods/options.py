@@ -24,18 +24,10 @@ class Options(NodeOptions):
         0.77, low=0.01, high=1.0, doc="Torsional over bending stiffness, GJ/EI; 0.77 for fibres."
     )
     cohesion: float = option(
-        10.0,
-        low=0.0,
-        high=60.0,
-        unit="1/s",
-        doc="Rate at which hair relaxes to the velocity of its neighbours.",
+        10.0, low=0.0, high=60.0, unit="1/s", doc="Rate at which neighbours' velocities even out."
     )
     pressure: float = option(
-        2.0,
-        low=0.0,
-        high=50.0,
-        unit="m/s^2",
-        doc="Acceleration out of cells twice as dense as in the captured hair.",
+        2.0, low=0.0, high=50.0, unit="m/s^2", doc="Push out of cells twice as dense as captured."
     )
     rounds: int = option(
         2,

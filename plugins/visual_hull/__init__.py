@@ -81,10 +81,7 @@ class Options:
     )
     min_views: int = option(2, low=1, high=64, doc="Views that must have hair at a cell.")
     forgive: int = option(
-        -1,
-        low=-1,
-        high=8,
-        doc="Views that may call a hair cell empty; -1 lets the scene's misfit decide.",
+        -1, low=-1, high=8, doc="Views that may call a hair cell empty; -1: by the misfit."
     )
     slack: float = option(2.0, low=0, high=30, doc="Growth of the hair masks.", unit="px")
     opening: float = option(
@@ -97,11 +94,7 @@ class Options:
         0.006, low=0, high=0.05, doc="A cell this far in front of seen skin is empty.", unit="m"
     )
     body_margin: float = option(
-        0.015,
-        low=0,
-        high=0.2,
-        doc="Assumed depth of clothes behind the person's hull, where no torso is fitted.",
-        unit="m",
+        0.015, low=0, high=0.2, doc="Depth of clothes where no torso is fitted.", unit="m"
     )
     erosions: int = option(0, low=0, high=8, doc="Erosions of the voted hull.")
     dilations: int = option(0, low=0, high=8, doc="Dilations after the erosions.")

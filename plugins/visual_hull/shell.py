@@ -47,8 +47,6 @@ HOLLOW = np.cos(np.radians(100.0))
 the room to the nape."""
 CURTAIN = 0.025
 """Least thickness of that curtain, metres."""
-FRONT_SHARE = 1.0
-"""How far hair lies before the scalp's front edge, in its thickness beside the head."""
 HANGS_BACK = 0.01
 """How far behind that edge hair hangs freely below the chin, metres."""
 CUT_OFF = 0.1
@@ -81,12 +79,12 @@ class Shell:
         scalp = scene.head.vertices[scene.head.scalp > 0.5].astype(np.float64)
         middle = (scalp.min(axis=0) + scalp.max(axis=0)) / 2
         head = _radii(scene.head.vertices - middle)
+        hang = _hang(head)
         sides = tuple(
-            (side, _outline(camera, mask, middle, side))
+            (side, _outline(camera, mask, middle, side, hang[_column(side)]))
             for camera, mask in zip(scene.cameras, masks, strict=True)
             for side in np.radians(camera.azimuth_deg) + np.array([-1, 1]) * np.pi / 2
         )
-        hang = _hang(head)
         thickness, there = _between(sides, hang)
         limit = np.minimum(hang + thickness, _front(scalp - middle, thickness))
         ahead = np.cos(_bearings())[:, None] > HOLLOW
@@ -165,13 +163,18 @@ def _front(scalp: Float64Array, thickness: Float64Array) -> Float64Array:
     edge = np.interp(np.arange(len(edge)), known, edge[known])
     ahead = np.cos(_bearings())[:, None] * np.cos(np.maximum(heights, 0) / CAP)
     hangs = np.clip(heights / CHIN, 0, 1)
-    with_hair = edge + (1 - hangs) * FRONT_SHARE * np.maximum(thickness, 0) - hangs * HANGS_BACK
+    with_hair = edge + (1 - hangs) * np.maximum(thickness, 0) - hangs * HANGS_BACK
     return np.where(ahead > 1e-3, with_hair / np.maximum(ahead, 1e-3), np.inf)
 
 
 def _bearings() -> Float64Array:
     """Return the columns' bearings, radians."""
     return (np.arange(BEARINGS) / BEARINGS - 0.5) * 2 * np.pi
+
+
+def _column(bearing: float) -> int:
+    """Return the column of a bearing in radians."""
+    return round((bearing / (2 * np.pi) + 0.5) * BEARINGS) % BEARINGS
 
 
 def _shows_hair(
@@ -206,19 +209,26 @@ def _feet() -> Float64Array:
     return np.stack([[0.0, min(height, 0.0), 0.0] for height in _heights()])
 
 
-def _outline(camera: Camera, mask: Mask, middle: Float64Array, side: float) -> Float64Array:
+def _outline(
+    camera: Camera, mask: Mask, middle: Float64Array, side: float, support: Float64Array
+) -> Float64Array:
     """Return the radius (rows,) of the outermost hair at a bearing beside the view; 0 without.
 
-    Hair that the picture's lower edge cuts off goes on as wide as there, down to `CUT_OFF`.
+    Hair that an edge of the picture cuts off is at least as far off the support (rows,) as in the
+    nearest row that shows its end. Cut off below it goes on as wide as there, down to `CUT_OFF`.
     """
-    radii = np.arange(0.0, FARTHEST, PROBE)
+    radii, rows = np.arange(0.0, FARTHEST, PROBE), np.arange(len(support))
     points = middle + _feet()[:, None] + radii[:, None] * _outwards(side)[:, None]
     found = np.where(_hair_at(camera, mask, points), radii, 0.0).max(axis=1)
+    last = np.rint(found / PROBE).astype(int)
+    beyond = camera.project(points[rows, np.minimum(last + 1, len(radii) - 1)])
+    cut = ((beyond < 0) | (beyond >= [camera.width, camera.height])).any(axis=1)
+    ends = rows[(found > 0) & ~cut]
+    if len(ends):
+        off = np.interp(rows, ends, (found - support)[ends])
+        found = np.where(cut & (found > 0), np.maximum(found, support + off), found)
     lowest = int((found > 0).argmax())
-    if (
-        lowest
-        and camera.project(points[lowest - 1, round(found[lowest] / PROBE)])[1] > camera.height
-    ):
+    if lowest and camera.project(points[lowest - 1, last[lowest]])[1] > camera.height:
         found[max(lowest - round(CUT_OFF / STEP), 0) : lowest] = found[lowest]
     return np.asarray(found)
 
@@ -236,10 +246,11 @@ def _between(
     thick, shown, total = np.zeros((3, *support.shape))
     for mirror, weight in ((1, 1.0), (-1, MIRRORED)):
         for side, outline in sides:
-            column = round((mirror * side / (2 * np.pi) + 0.5) * BEARINGS) % BEARINGS
             has = (outline > 0).astype(float)
             soft = ndimage.gaussian_filter1d(has, SMOOTH / STEP)
-            off = ndimage.gaussian_filter1d(has * (outline - support[column]), SMOOTH / STEP)
+            off = ndimage.gaussian_filter1d(
+                has * (outline - support[_column(mirror * side)]), SMOOTH / STEP
+            )
             near = weight * np.exp(NEAR_BEARING * (np.cos(bearings - mirror * side) - 1))[:, None]
             thick += near * off
             shown += near * soft

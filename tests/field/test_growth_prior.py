@@ -20,7 +20,7 @@ from hairkit.field.growth_prior import (
     combing_direction,
     gradient,
     growth_potential,
-    hair_way,
+    hair_ways,
     measure_scalp_distance,
 )
 from hairkit.testing import ball_head, scalp_roots
@@ -243,20 +243,48 @@ def test_short_hair_has_no_parting() -> None:
     np.testing.assert_array_equal(plain, parted)
 
 
+def way(hull: Hull, longest: float, guessed: bool = False) -> Float64Array:
+    """The ways (N,) of hair on the ball."""
+    nothing = np.zeros(hull.grid.shape, np.float32)
+    return hair_ways(hull, nothing, scalp_roots(ball_head()), longest, guessed)
+
+
+def with_tuft(hull: Hull, radius: float) -> Hull:
+    """The hull with hair that stands off the top, over a radius in metres."""
+    place = hull.grid.centres()
+    tuft = (hull.head_distance > 0) & (np.hypot(place[..., 0], place[..., 2]) < radius)
+    tuft &= hull.head_distance < 0.04
+    return replace(hull, dense=hull.dense | tuft, loose=hull.loose | tuft)
+
+
 def test_the_way_through_short_hair_is_that_of_most_of_it() -> None:
     """A tuft that stands off, or an outline that fits badly, makes no other strand longer."""
-    hull, roots = curtain(0.004, hem=0.0, thickness=0.012), scalp_roots(ball_head())
-    plain = hair_way(hull, roots, 0.02)
+    hull = curtain(0.004, hem=0.0, thickness=0.012)
+    plain = way(hull, 0.02)
     assert plain == pytest.approx(WAY_OF_HEIGHT * 0.01, rel=0.2)  # centres of the outermost cells
-    place = hull.grid.centres()
-    tuft = (hull.head_distance > 0) & (np.hypot(place[..., 0], place[..., 2]) < 0.015)
-    tufted = replace(hull, dense=hull.dense | tuft, loose=hull.loose | tuft)
-    assert hair_way(tufted, roots, SHORT_HAIR) == pytest.approx(plain, rel=0.05)
+    assert way(with_tuft(hull, 0.015), SHORT_HAIR) == pytest.approx(plain, rel=0.05)
+
+
+def test_hair_on_top_is_as_long_as_one_photo_shows_it_there() -> None:
+    """Cropped sides do not shorten the top of hair whose height is smooth, a guess."""
+    hull = with_tuft(curtain(0.004, hem=0.0, thickness=0.008), 0.07)
+    at = scalp_roots(ball_head()).positions
+    ways = way(hull, SHORT_HAIR, guessed=True)
+    assert ways[at[:, 1] > 0.09].mean() > 2 * ways[at[:, 1] < 0.03].mean()
+    assert np.ptp(way(hull, SHORT_HAIR)) == 0
 
 
 def test_the_way_through_long_hair_is_its_longest() -> None:
     """Its height tells nothing of its length; in between the way grows with the longest."""
-    hull, roots = curtain(thickness=0.02), scalp_roots(ball_head())
-    ways = [hair_way(hull, roots, longest) for longest in (SHORT_HAIR, 0.045, LONG_HAIR, 0.3)]
+    hull = curtain(thickness=0.02)
+    ways = [float(way(hull, longest)[0]) for longest in (SHORT_HAIR, 0.045, LONG_HAIR, 0.3)]
     assert ways[2:] == [LONG_HAIR, 0.3]
     assert ways == sorted(ways)
+
+
+def test_long_hair_may_be_as_long_as_its_own_way_to_the_tips() -> None:
+    """The longest way is that from the nearest scalp: hair of the crown has farther to go."""
+    hull, roots = curtain(thickness=0.02), scalp_roots(ball_head())
+    growth = -hull.grid.centres()[..., 1].astype(np.float32) - np.float32(0.1)
+    ways = hair_ways(hull, growth, roots, 0.12)
+    np.testing.assert_allclose(ways, np.maximum(roots.positions[:, 1] + 0.1, 0.12), atol=2e-3)

@@ -11,7 +11,7 @@ from scipy import ndimage
 
 from hairkit.arrays import Float32Array, Float64Array
 from hairkit.field.parting import comb_from_parting, crown_share, front_share
-from hairkit.field.scalp_comb import Front, comb_beside_parting, comb_scalp, see_front
+from hairkit.field.scalp_comb import Front, comb_beside_parting, comb_scalp, fringe_share, see_front
 from hairkit.field.scalp_sight import see_scalp
 from hairkit.types.parting import Parting
 from tests.support import tied_ball as ball
@@ -221,3 +221,11 @@ def test_a_fringe_runs_forward_over_the_forehead() -> None:
     np.testing.assert_allclose(fringed[share == 0], parted[share == 0])
     counted = crown_share(Parting(fringe=True), ball.HEAD, points)
     assert (counted >= share).all()
+
+
+@pytest.mark.parametrize(("bare", "share"), [(BARE, 0.0), (COVERED, 1.0)])
+def test_hair_on_the_forehead_is_a_fringe_of_any_length(bare: float, share: float) -> None:
+    """Whatever its directions: short hair that covers the forehead lies on it."""
+    camera = ball.cameras()[0]
+    mask, _ = ball.drawn(camera, across, bare)
+    assert fringe_share((mask,), (camera,), ball.HEAD) == pytest.approx(share, abs=0.3)

@@ -8,13 +8,23 @@ import numpy as np
 import pytest
 from ball import ball_evidence
 
-from hairkit.field.unseen import FLOW_WEIGHT, add_flow, add_surface_planes, group_seen
+from hairkit.arrays import Float64Array
+from hairkit.field.growth_prior import whorl_direction
+from hairkit.field.unseen import (
+    FALLING,
+    FLOW_WEIGHT,
+    add_flow,
+    add_surface_planes,
+    group_seen,
+    measure_ways,
+)
 from hairkit.testing import ball_head
 from hairkit.types.camera import Camera
 from hairkit.types.mask import HAIR, Mask
 from hairkit.types.scene import Scene
 from hairkit.types.strands import CONTINUED, SEEN, Strands
 from hairkit.types.volume import XX, YY, ZZ, Hull, VoxelGrid
+from tests.support import tied_ball
 
 
 def shell() -> Hull:
@@ -68,7 +78,43 @@ def test_short_hair_that_is_not_seen_lies_along_the_head() -> None:
         for share in (0.0, 1.0)
     ]
     assert down[0][high].mean() > down[0][low].mean() > 0.4
-    assert down[1][high].mean() < 0.1
+    above = (at[:, 1] > 0.03) & (at[:, 1] < 0.05)  # the nape
+    assert down[1][above].mean() < 0.2
+
+
+def test_long_hair_that_is_not_seen_falls_below_the_nape() -> None:
+    """Wherever the tips are: above it hair runs to them."""
+    hull = shell()
+    count = int(hull.loose.sum())
+    nothing = np.zeros((count, 6), np.float32), np.zeros(count, np.float32)
+    aside = hull.grid.centres()[..., 0].astype(np.float32)
+    at = hull.grid.centres_of(hull.loose)
+    down = add_flow(ball_head(), hull, aside, 1.0, *nothing)[0][:, YY]
+    nape = ball_head().vertices[ball_head().scalp > 0.5, 1].min()
+    assert down[at[:, 1] < nape].min() > 0.9
+    assert down[at[:, 1] > nape + FALLING].max() < 0.1
+
+
+@pytest.mark.parametrize("back", [True, False])
+def test_hair_combed_back_in_a_front_photo_ends_behind(back: bool) -> None:
+    """Its way leads from the forehead to the hindmost scalp; other short hair ends everywhere."""
+    camera, hull = tied_ball.cameras()[0], tied_ball.tied_hull()
+    thin = (
+        (hull.head_distance > 0) & (hull.head_distance < 0.012) & (hull.grid.centres()[..., 1] > 0)
+    )
+    hull = replace(hull, dense=thin, loose=thin)
+
+    def comb(points: Float64Array) -> Float64Array:
+        outward = points / np.linalg.norm(points, axis=1, keepdims=True)
+        down = whorl_direction(tied_ball.HEAD, points, outward)
+        return np.cross(outward, down) if back else down
+
+    mask, seen = tied_ball.drawn(camera, comb)
+    scene = Scene(("front",), (camera,), tied_ball.HEAD)
+    ways = measure_ways(scene, hull, (mask,), (seen,))
+    forehead, behind = hull.grid.sample(ways.values, [[0, 0.03, 0.1], [0, 0.03, -0.1]])
+    assert (ways.hair_length > 0.15) == back
+    assert (behind - forehead > 0.1) == back
 
 
 def test_strands_before_a_camera_are_seen() -> None:

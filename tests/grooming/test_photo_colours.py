@@ -77,6 +77,12 @@ def test_hair_of_two_hues_has_both() -> None:
     assert np.abs(hues - true_hues).max() < 0.5 * between  # grey light makes pink paler
 
 
+def test_one_photo_dyes_no_patches() -> None:
+    """It may show light of two colours: the hair has the hues of its roots and tips alone."""
+    views, masks = photographed(half_pink())
+    assert with_hues(PLAIN, views[:1], masks[:1], CAMERAS[:1]).strands.colours is None
+
+
 def test_the_hue_is_that_of_the_strands() -> None:
     """What masks take for hair beside the strands, such as clothes, gives the hair no hue."""
     views, masks = photographed(PLAIN)

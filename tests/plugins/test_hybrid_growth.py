@@ -49,7 +49,13 @@ def run(
 ) -> Strands:
     assert field.direction is not None
     starts = np.array([[0.0, 0, 0], [0.05, 0.02, -0.03]], np.float32)
-    return grow(field, signed_volume(field, field.direction, distance), starts, way, options)
+    return grow(
+        field,
+        signed_volume(field, field.direction, distance),
+        starts,
+        np.full(len(starts), way),
+        options,
+    )
 
 
 def test_strands_follow_the_sign_of_the_field() -> None:
@@ -90,7 +96,14 @@ def test_strands_slide_along_the_surface_they_meet_at_a_small_angle() -> None:
     options = replace(FREE, slide_sine=0.35, reach=1.0, inertia=0.0, blind=0.0, bound=1.5)
     starts = np.array([[-0.1, -0.005, 0.0]], np.float32)
     flat, steep = (
-        grow(field, signed_volume(field, field.direction, distance), starts, 0.15, options, early=0)
+        grow(
+            field,
+            signed_volume(field, field.direction, distance),
+            starts,
+            np.full(len(starts), 0.15),
+            options,
+            early=0,
+        )
         for field in (constant((0.97, 0.24, 0)), constant((0.5, 0.87, 0)))
         if field.direction is not None
     )
@@ -117,7 +130,12 @@ def test_strands_that_meet_the_shoulders_turn_where_the_hair_goes_on(
     assert field.direction is not None
     below, above = (
         grow(
-            field, signed_volume(field, field.direction, distance), starts, 0.15, options, height
+            field,
+            signed_volume(field, field.direction, distance),
+            starts,
+            np.full(len(starts), 0.15),
+            options,
+            height,
         ).tips[0]
         for height in (0.05, -0.1)
     )
@@ -138,23 +156,11 @@ def test_long_hair_is_no_stub_where_it_leaves_near_its_root(way: float, turns: b
     assert field.direction is not None
     options = replace(FREE, slide_sine=0.35, reach=1.0, blind=0.0)
     starts = np.array([[-0.1, -0.02, 0.0]], np.float32)
-    grown = grow(field, signed_volume(field, field.direction, distance), starts, way, options)
+    grown = grow(
+        field, signed_volume(field, field.direction, distance), starts, np.full(1, way), options
+    )
     length, height = grown.lengths()[0], grown.tips[0, 1]
     assert length > 0.1 if turns else 0.008 < height < 0.013
-
-
-def test_long_strands_grow_as_far_as_their_own_tips() -> None:
-    """The longest way is that from the nearest scalp: hair of the crown has farther to go."""
-    inside = np.full(GRID.shape, 0.5, np.float32)
-    field = falling((0, -1, 0))
-    assert field.direction is not None
-    starts = np.array([[0.0, 0.15, 0], [0.0, -0.15, 0]], np.float32)
-    options = replace(FREE, reach=1.0)
-    far, near = grow(
-        field, signed_volume(field, field.direction, inside), starts, 0.12, options
-    ).lengths()
-    assert far == pytest.approx(0.15, abs=2e-3)
-    assert near == pytest.approx(0.12, abs=2e-3)
 
 
 def test_a_root_where_nothing_is_known_keeps_its_place() -> None:
@@ -227,7 +233,9 @@ def test_growth_equals_its_readable_twin(seed: int) -> None:
     options = replace(FREE, slide_sine=0.6, slide_from=0.8, bound=1.4, inertia=0.5, blind=0.01)
     starts = rng.normal(0, 0.02, (12, 3)).astype(np.float32)
     field = constant((0, 1, 0))
-    found = grow(field, signed_volume(field, direction, distance), starts, 0.1, options)
+    found = grow(
+        field, signed_volume(field, direction, distance), starts, np.full(len(starts), 0.1), options
+    )
     values = np.concatenate([direction, distance[..., None]], axis=3)
     steps, free = int(options.reach * 0.1 / options.step), int(0.1 / options.step)
     for start, points in zip(starts, found.points.reshape(12, -1, 3), strict=True):
@@ -312,7 +320,7 @@ def test_sliding_strands_are_pulled_back_to_the_surface() -> None:
             field,
             signed_volume(field, field.direction, distance),
             starts,
-            0.1,
+            np.full(len(starts), 0.1),
             replace(options, pull=p),
         )
         for p in (0.0, 1.0)

@@ -69,6 +69,20 @@ def test_hair_that_the_lower_edge_cuts_off_goes_on(height: float) -> None:
     assert behind[:, 1].min() == pytest.approx(height - CUT_OFF, abs=0.02)
 
 
+def test_hair_that_the_upper_edge_cuts_off_is_as_thick_as_below() -> None:
+    """A photo that ends within the hair on top gives nearly the hull of the whole photo."""
+    scene, masks = photo()
+    edge = round(float(scene.cameras[0].project([0.0, 0.085, 0.0])[1]))
+    camera = scene.cameras[0]
+    cropped = replace(camera, height=HEIGHT - edge, centre=camera.centre - np.array([0.0, edge]))
+    labels = masks[0].labels[edge:]
+    whole = cells(build_hull(scene, masks, OPTIONS))
+    found = cells(build_hull(replace(scene, cameras=(cropped,)), (Mask(labels, True),), OPTIONS))
+    for beside in (0.0, 0.05):
+        top, true = (each[np.abs(each[:, 0] - beside) < 0.01, 1].max() for each in (found, whole))
+        assert top == pytest.approx(true, abs=0.01)
+
+
 def test_seen_skin_stays_bare() -> None:
     """No cell lies before the face, nor beside what the photo shows of the hair."""
     scene, masks = photo()
