@@ -248,8 +248,7 @@ class _Fit:
 
 def _soften(misses: Float64Array) -> Float64Array:
     """Return misses whose squares grow only linearly when they are large (Charbonnier's loss)."""
-    softened: Float64Array = np.sign(misses) * np.sqrt(2 * (np.sqrt(1 + misses**2) - 1))
-    return softened
+    return np.asarray(np.sign(misses) * np.sqrt(2 * (np.sqrt(1 + misses**2) - 1)))
 
 
 def _similar(points: Float64Array | Float32Array, values: Float64Array) -> Float64Array:
@@ -257,8 +256,7 @@ def _similar(points: Float64Array | Float32Array, values: Float64Array) -> Float
     from scipy.spatial.transform import Rotation
 
     turn = Rotation.from_rotvec(values[1:4]).as_matrix()
-    moved: Float64Array = np.exp(values[0]) * points.astype(np.float64) @ turn.T + values[4:7]
-    return moved
+    return np.asarray(np.exp(values[0]) * points.astype(np.float64) @ turn.T + values[4:7])
 
 
 def _metres(camera: Camera, points: Float64Array) -> Float64Array:

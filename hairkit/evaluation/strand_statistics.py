@@ -82,8 +82,7 @@ def broken(strands: Strands) -> BoolArray:
     own = near == np.arange(len(strands))[:, None]
     own[~own.any(axis=1), -1] = True
     others = near[~own].reshape(len(strands), count)
-    short: BoolArray = lengths < 0.5 * np.median(lengths[others], axis=1)
-    return short
+    return np.asarray(lengths < 0.5 * np.median(lengths[others], axis=1))
 
 
 def head_measures(strands: Strands, samples: Samples, head: Head) -> HeadMeasures:

@@ -192,8 +192,7 @@ def whorl_direction(head: Head, at: Float64Array, outward: Float64Array) -> Floa
     away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-6)
     combed = WHORL_SLOPE * away + [0.0, -1.0, 0.0]
     combed -= np.sum(combed * outward, axis=1, keepdims=True) * outward
-    result: Float64Array = combed / np.maximum(np.linalg.norm(combed, axis=1, keepdims=True), 1e-6)
-    return result
+    return np.asarray(combed / np.maximum(np.linalg.norm(combed, axis=1, keepdims=True), 1e-6))
 
 
 def gradient(grid: VoxelGrid, values: Float32Array, points: npt.ArrayLike) -> Float64Array:

@@ -105,5 +105,4 @@ def _normals(values: Float32Array, places: Float64Array) -> Float32Array:
         slopes.append(behind - ahead)
     normals = np.stack(slopes, axis=1)
     length = np.linalg.norm(normals, axis=1, keepdims=True)
-    result: Float32Array = (normals / np.maximum(length, 1e-9)).astype(np.float32)
-    return result
+    return np.asarray((normals / np.maximum(length, 1e-9)).astype(np.float32))

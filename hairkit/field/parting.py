@@ -56,8 +56,7 @@ def front_share(head: Head, points: npt.ArrayLike) -> Float64Array:
     foremost = float(scalp[:, 2].max())
     lowest = float(scalp[scalp[:, 2] > foremost - FRONT_FADE, 1].min())
     margins = [at[:, 2] - foremost + FRONT_DEPTH, FRONT_WIDTH - np.abs(at[:, 0]), at[:, 1] - lowest]
-    share: Float64Array = np.clip(np.min(margins, axis=0) / FRONT_FADE + 1, 0.0, 1.0)
-    return share
+    return np.asarray(np.clip(np.min(margins, axis=0) / FRONT_FADE + 1, 0.0, 1.0))
 
 
 def comb_from_parting(
@@ -109,8 +108,7 @@ def _nearest_on(line: Float64Array, at: Float64Array) -> Float64Array:
     along = np.clip(((at[:, None] - start) * way).sum(axis=2) / length, 0, 1)
     foot = start + along[..., None] * way
     best = np.linalg.norm(at[:, None] - foot, axis=2).argmin(axis=1)
-    nearest: Float64Array = foot[np.arange(len(at)), best]
-    return nearest
+    return np.asarray(foot[np.arange(len(at)), best])
 
 
 def root_lift(hull: Hull, points: npt.ArrayLike) -> Float64Array:
@@ -124,10 +122,8 @@ def root_lift(hull: Hull, points: npt.ArrayLike) -> Float64Array:
     cell = hull.grid.nearest_cell(points)
     distance = hull.grid.sample(hull.head_distance, points).astype(np.float64)
     over = np.clip(thickness[cell[:, 0], cell[:, 2]], THINNEST, THICKEST)
-    lift: Float64Array = np.clip(1 - distance / over, 0.0, 1.0)
-    return lift
+    return np.asarray(np.clip(1 - distance / over, 0.0, 1.0))
 
 
 def _tangent(vector: Float64Array, outward: Float64Array) -> Float64Array:
-    tangent: Float64Array = vector - np.einsum("ij,ij->i", vector, outward)[:, None] * outward
-    return tangent
+    return np.asarray(vector - np.einsum("ij,ij->i", vector, outward)[:, None] * outward)

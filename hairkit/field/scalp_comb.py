@@ -139,8 +139,7 @@ def _neighbours(at: Float64Array, of: Float64Array, blur: float) -> sparse.csr_m
 def _tangent(vectors: Float64Array, normals: Float64Array) -> Float64Array:
     """Return the unit tangential parts of vectors (N, 3)."""
     flat = vectors - (vectors * normals).sum(axis=1, keepdims=True) * normals
-    unit: Float64Array = flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-9)
-    return unit
+    return np.asarray(flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-9))
 
 
 def _across_hairline(sight: ScalpSight, head: Head) -> float:

@@ -111,8 +111,7 @@ def _lay_on_surface(
     b = picture[:, 0, 0] * wanted[:, 1] - picture[:, 1, 0] * wanted[:, 0]
     tangent = a[:, None] * first + b[:, None] * second
     length = np.linalg.norm(tangent, axis=1, keepdims=True)
-    unit: Float64Array = tangent / np.maximum(length, 1e-12)
-    return unit
+    return np.asarray(tangent / np.maximum(length, 1e-12))
 
 
 def find_convergence(sight: ScalpSight, head: Head) -> tuple[Float64Array, float]:

@@ -196,8 +196,7 @@ def _ends(count: int, tail: Tail) -> Int64Array:
     """Return the last section (N,) that each of `count` strands reaches."""
     quantile = np.mod((np.arange(count) + 0.5) * GOLDEN / (2 * np.pi), 1.0)
     reached = np.searchsorted(-tail.share, -quantile, side="left") - 1
-    result: Int64Array = np.clip(reached, 1, len(tail.share) - 1).astype(np.int64)
-    return result
+    return np.asarray(np.clip(reached, 1, len(tail.share) - 1).astype(np.int64))
 
 
 def _join(way: Float64Array, hanging: Float64Array) -> Float64Array:

@@ -124,8 +124,7 @@ def _section(
     wanted = np.interp(angle, even, smooth, period=2 * np.pi) + off
     share = wanted / np.maximum(distance, 1e-9)
     x, y, z = (ring - middle).T
-    result: Float64Array = middle + np.stack([share * x, y - TILT * share * z, share * z], axis=1)
-    return result
+    return np.asarray(middle + np.stack([share * x, y - TILT * share * z, share * z], axis=1))
 
 
 def _lay_collar(
@@ -171,5 +170,4 @@ def _give_way(rings: Float64Array, middle: Float64Array, strands: Strands | None
     sized = [
         np.interp(a, even, s, period=2 * np.pi) for a, s in zip(reach_angle, smooth, strict=True)
     ]
-    result: Float64Array = np.clip(np.stack(sized), GIVE, 1)
-    return result
+    return np.asarray(np.clip(np.stack(sized), GIVE, 1))

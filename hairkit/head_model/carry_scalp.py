@@ -39,8 +39,7 @@ class Carrier:
     def carry(self, values: Float32Array) -> Float64Array:
         """Return the head's values (V', K) or (V',) at the other's vertices, (V, K)."""
         at_corners = values.reshape(len(values), -1)[self.faces]
-        mixed: Float64Array = np.einsum("nk,nkd->nd", self.weights, at_corners)
-        return mixed
+        return np.asarray(np.einsum("nk,nkd->nd", self.weights, at_corners))
 
     def scalp(self, head: Head) -> Float64Array:
         """Return the head's scalp at the other's vertices, (V,)."""

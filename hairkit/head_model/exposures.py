@@ -42,5 +42,4 @@ def even_exposures(
     prior = np.array([weight.sum() for weight in flat]) * GAIN_PRIOR
     gains = np.linalg.solve(normal + np.diag(prior + 1e-9), right)
     mean = (prior[:, None] * gains).sum(axis=0) / max(prior.sum(), 1e-9)
-    result: Float64Array = np.exp(gains - mean)
-    return result
+    return np.asarray(np.exp(gains - mean))

@@ -163,8 +163,7 @@ def open_lids(points: Float64Array) -> Float64Array:
     lacking = (RADIUS + LID - distance) / LID_BLEND
     moved = LID_BLEND * np.logaddexp(0, lacking) * (points[:, 2] > FACE)
     lids = points + 1e-3 * (moved / distance)[:, None] * away
-    opened: Float64Array = lids - np.outer(1e-3 * POCKET * t * t * (3 - 2 * t), [0, 0, 1])
-    return opened
+    return np.asarray(lids - np.outer(1e-3 * POCKET * t * t * (3 - 2 * t), [0, 0, 1]))
 
 
 # SciPy's splines take as long to load as NumPy: they are loaded when a head is made.

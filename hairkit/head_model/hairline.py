@@ -78,8 +78,7 @@ def _hair_at(camera: Camera, mask: Mask, vertices: Float64Array) -> Float64Array
     u, v = np.nan_to_num(camera.project(vertices)).T
     column = np.clip(u, 0, camera.width - 1).astype(np.int64)
     row = np.clip(v, 0, camera.height - 1).astype(np.int64)
-    share: Float64Array = blurred[row, column].astype(np.float64)
-    return share
+    return np.asarray(blurred[row, column].astype(np.float64))
 
 
 def _average(
@@ -98,8 +97,7 @@ def _average(
     close = np.exp((distance[:, :1] ** 2 - distance**2) / (2 * SKIN_BLUR**2))
     close *= np.exp(-((distance[:, :1] / reach) ** 2))
     total = (close * weight[near]).sum(axis=1) + PRIOR
-    result: Float64Array = (close * against[near]).sum(axis=1) / total
-    return result
+    return np.asarray((close * against[near]).sum(axis=1) / total)
 
 
 def _close(vertices: Float64Array, density: Float64Array) -> Float64Array:

@@ -118,8 +118,7 @@ def _stretch(
     level, above, below = levels
     away = points[:, 1] - level
     fade = np.exp(-0.5 * (away / np.where(away > 0, above, below)) ** 2)
-    moves: Float64Array = fade[:, None] * np.array(share) * (points - np.array(middle))
-    return moves
+    return np.asarray(fade[:, None] * np.array(share) * (points - np.array(middle)))
 
 
 def _lift(points: Float64Array, move: float, first: float, last: float) -> Float64Array:

@@ -280,5 +280,4 @@ def _face_normals(corners: Float64Array) -> Float64Array:
     """Return the unit normals (F, 3) of triangles (F, 3, 3); 0 of those without area."""
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     length = np.linalg.norm(normals, axis=1, keepdims=True)
-    unit: Float64Array = normals / np.maximum(length, 1e-300)
-    return unit
+    return np.asarray(normals / np.maximum(length, 1e-300))

@@ -153,8 +153,7 @@ def _interpolate(
     head: Head, triangle: npt.NDArray[np.integer], weights: Float64Array, values: npt.ArrayLike
 ) -> Float64Array:
     corners = np.asarray(values, np.float64)[head.faces[triangle]]
-    result: Float64Array = np.einsum("nk,nkd->nd", weights, corners)
-    return result
+    return np.asarray(np.einsum("nk,nkd->nd", weights, corners))
 
 
 def _at_rest(head: Head, rest: Head | None) -> Head:
@@ -310,8 +309,7 @@ def _project(points: Float64Array, normals: Float64Array) -> Float64Array:
     direction = points - middle
     direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-12)
     plane = np.stack([direction @ right, direction @ np.cross(pole, right)], axis=1)
-    result: Float64Array = plane / np.maximum(1 + direction @ pole, 1e-3)[:, None]
-    return result
+    return np.asarray(plane / np.maximum(1 + direction @ pole, 1e-3)[:, None])
 
 
 def _without_bridges(points: Float64Array, faces: Int32Array) -> Int32Array:
@@ -327,5 +325,4 @@ def _without_bridges(points: Float64Array, faces: Int32Array) -> Int32Array:
         if not used[faces[face]].all():
             keep[face] = True
             used[faces[face]] = True
-    kept: Int32Array = faces[keep]
-    return kept
+    return np.asarray(faces[keep])

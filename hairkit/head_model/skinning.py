@@ -52,11 +52,9 @@ def _upward(spine: Float64Array) -> Float64Array:
     up = spine / length if length > 1e-6 else np.array([0.0, 1.0, 0.0])
     ahead = np.array([0.0, 0.0, 1.0]) - up[2] * up
     ahead /= max(float(np.linalg.norm(ahead)), 1e-6)
-    result: Float64Array = np.cos(_LEAN) * up + np.sin(_LEAN) * ahead
-    return result
+    return np.asarray(np.cos(_LEAN) * up + np.sin(_LEAN) * ahead)
 
 
 def _smooth_step(share: Float64Array) -> Float64Array:
     inside = share.clip(0.0, 1.0)
-    result: Float64Array = inside * inside * (3.0 - 2.0 * inside)
-    return result
+    return np.asarray(inside * inside * (3.0 - 2.0 * inside))

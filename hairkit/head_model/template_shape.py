@@ -165,8 +165,7 @@ def scalp_weight(points: Float64Array) -> Float64Array:
     slope = np.degrees(hairline.derivative()(azimuth)) / radius
     beyond = (y - hairline(azimuth)) / np.sqrt(1 + slope**2)
     t = np.clip(0.5 + beyond / _HAIRLINE_FADE, 0, 1)
-    result: Float64Array = t * t * (3 - 2 * t)
-    return result
+    return np.asarray(t * t * (3 - 2 * t))
 
 
 def _level_curves(polar: Float64Array, azimuth: Float64Array) -> Float64Array:

@@ -183,8 +183,7 @@ def _noise(points: Float64Array, period: float, seed: int) -> Float64Array:
     spread = 2 * np.pi / (_PERIODS_MEAN * period)
     turns = generator.normal(0, spread, (points.shape[1], _WAVES))
     phase = generator.uniform(0, 2 * np.pi, _WAVES)
-    result: Float64Array = np.cos(points @ turns + phase).sum(axis=1) / np.sqrt(_WAVES)
-    return result
+    return np.asarray(np.cos(points @ turns + phase).sum(axis=1) / np.sqrt(_WAVES))
 
 
 if __name__ == "__main__":

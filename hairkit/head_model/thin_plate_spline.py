@@ -68,5 +68,4 @@ class ThinPlateSpline:
 
     def __call__(self, points: npt.ArrayLike) -> Float64Array:
         """Return (M, K) the map at points (M, D)."""
-        result: Float64Array = self._solved(np.asarray(points, np.float64))
-        return result
+        return np.asarray(self._solved(np.asarray(points, np.float64)))

@@ -92,5 +92,4 @@ def mean_error(path: Path, arcs: Arcs) -> Float64Array:
         gap = points - wanted
         across = gap - dot(gap, tangents)[:, None] * tangents
         total += np.sqrt(dot(across, across))
-    result: Float64Array = np.bincount(strand, total, len(counts)) / (counts * len(_SAMPLES))
-    return result
+    return np.asarray(np.bincount(strand, total, len(counts)) / (counts * len(_SAMPLES)))

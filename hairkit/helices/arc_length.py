@@ -59,8 +59,7 @@ class Path:
 
 def dot(a: Float64Array, b: Float64Array) -> Float64Array:
     """Return the inner products (...) of vectors (..., 3)."""
-    result: Float64Array = np.einsum("...i,...i->...", a, b)  # many times faster than a sum
-    return result
+    return np.asarray(np.einsum("...i,...i->...", a, b))  # many times faster than a sum
 
 
 def unit(vector: Float64Array) -> Float64Array:

@@ -54,8 +54,7 @@ def rotation(vector: npt.ArrayLike) -> Float64Array:
     """Return (..., 3, 3) the rotation by |v| radians about v (Rodrigues)."""
     v = np.asarray(vector, np.float64)
     turns = Rotation.from_rotvec(v.reshape(-1, 3)).as_matrix()
-    result: Float64Array = turns.reshape(*v.shape, 3)
-    return result
+    return np.asarray(turns.reshape(*v.shape, 3))
 
 
 def mean_rotation(vector: npt.ArrayLike) -> Float64Array:

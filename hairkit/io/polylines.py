@@ -90,8 +90,7 @@ def _strand_of(nodes: Int64Array) -> Int64Array:
     """Return the number of the strand of each node."""
     count = int(nodes.max()) + 1
     graph = coo_matrix((np.ones(len(nodes), np.int8), tuple(nodes.T)), (count, count))
-    strand: Int64Array = connected_components(graph, directed=False)[1]
-    return strand
+    return np.asarray(connected_components(graph, directed=False)[1])
 
 
 def _strands(nodes: Int64Array, vertex: Int64Array) -> tuple[Int64Array, Int64Array]:

@@ -228,6 +228,5 @@ def _outline(kind: str, points: Float64Array) -> Float64Array:
     if kind == "circle":  # labelme: the centre and a point on the circle
         turn = np.linspace(0, 2 * np.pi, 32, endpoint=False)
         radius = np.linalg.norm(points[1] - points[0])
-        circle: Float64Array = points[0] + radius * np.stack([np.cos(turn), np.sin(turn)], axis=1)
-        return circle
+        return np.asarray(points[0] + radius * np.stack([np.cos(turn), np.sin(turn)], axis=1))
     return points

@@ -113,8 +113,7 @@ def draw_ribbons(
 
 def strand_numbers(count: int) -> Float32Array:
     """Return a quasi-random number in [0, 1) for each strand (golden-ratio sequence)."""
-    numbers: Float32Array = np.mod(np.arange(count) * _GOLDEN_STEP, 1.0).astype(np.float32)
-    return numbers
+    return np.asarray(np.mod(np.arange(count) * _GOLDEN_STEP, 1.0).astype(np.float32))
 
 
 def packed_colours(colours: Float32Array) -> UInt32Array:

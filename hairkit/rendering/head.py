@@ -73,8 +73,7 @@ def _neck(head: Head) -> Float32Array:
     """Return (V,) 1 at the lower joint of the neck and below, 0 at the upper one and above."""
     low, high = head.joints[:2, 1]
     share = np.clip((high - head.vertices[:, 1]) / max(float(high - low), 1e-6), 0.0, 1.0)
-    result: Float32Array = (share * share * (3 - 2 * share)).astype(np.float32)
-    return result
+    return np.asarray((share * share * (3 - 2 * share)).astype(np.float32))
 
 
 def bust_solid(

@@ -80,8 +80,7 @@ def largest_turn(points: Float64Array) -> Float64Array:
     """Return the largest turn (S,) at a node, radians."""
     direction = directions(points)
     cosine = (direction[:, 1:] * direction[:, :-1]).sum(axis=-1)
-    result: Float64Array = np.arccos(np.clip(cosine, -1.0, 1.0)).max(axis=1)
-    return result
+    return np.asarray(np.arccos(np.clip(cosine, -1.0, 1.0)).max(axis=1))
 
 
 def embed_points(strands: Strands, position: Float64Array, frames: Float64Array) -> Embedding:

@@ -240,5 +240,4 @@ def _align_signs(turns: Float64Array) -> Float64Array:
     """Choose the signs of quaternions so that neighbours are close."""
     sign = np.sign((turns[1:] * turns[:-1]).sum(axis=1))
     sign[sign == 0] = 1.0
-    near: Float64Array = turns * np.concatenate([[1.0], np.cumprod(sign)])[:, None]
-    return near
+    return np.asarray(turns * np.concatenate([[1.0], np.cumprod(sign)])[:, None])

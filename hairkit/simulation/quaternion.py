@@ -33,15 +33,13 @@ def product(a: Float64Array, b: Float64Array) -> Float64Array:
 
 def inverse(q: Float64Array) -> Float64Array:
     """Return the conjugate, which is the inverse of a unit quaternion."""
-    back: Float64Array = q * np.array([1.0, -1.0, -1.0, -1.0])
-    return back
+    return np.asarray(q * np.array([1.0, -1.0, -1.0, -1.0]))
 
 
 def normalize(q: Float64Array) -> Float64Array:
     """Return quaternions or vectors scaled to length 1; zero stays zero."""
     length = np.linalg.norm(q, axis=-1, keepdims=True)
-    result: Float64Array = q / np.maximum(length, 1e-300)
-    return result
+    return np.asarray(q / np.maximum(length, 1e-300))
 
 
 def rotate(q: Float64Array, vector: npt.ArrayLike) -> Float64Array:
@@ -83,16 +81,14 @@ def from_matrix(matrix: npt.ArrayLike) -> Float64Array:
     """Return the quaternions (..., 4) of rotation matrices (..., 3, 3), with w >= 0."""
     given = np.asarray(matrix, np.float64)
     found = Rotation.from_matrix(given.reshape(-1, 3, 3)).as_quat(canonical=True)
-    q: Float64Array = np.roll(found, 1, axis=-1).reshape(*given.shape[:-2], 4)
-    return q
+    return np.asarray(np.roll(found, 1, axis=-1).reshape(*given.shape[:-2], 4))
 
 
 def to_matrix(q: npt.ArrayLike) -> Float64Array:
     """Return the rotation matrices (..., 3, 3) of unit quaternions."""
     given = np.asarray(q, np.float64)
     turns = Rotation.from_quat(np.roll(given, -1, axis=-1).reshape(-1, 4))
-    matrix: Float64Array = turns.as_matrix().reshape(*given.shape[:-1], 3, 3)
-    return matrix
+    return np.asarray(turns.as_matrix().reshape(*given.shape[:-1], 3, 3))
 
 
 def slerp(start: Float64Array, end: Float64Array, share: float) -> Float64Array:

@@ -55,8 +55,7 @@ def air_velocity(
     # reduced in float64: far from the origin float32 has no digits for them
     phases = np.fmod(phases - (waves @ wind + rates) * time + waves @ at[:3, 3], 2 * np.pi)
     angle = points @ (waves @ at[:3, :3]).T.astype(kind) + phases.astype(kind)
-    result: Float64Array = mean + np.cos(angle) @ (strength * amplitudes).astype(kind)
-    return result
+    return np.asarray(mean + np.cos(angle) @ (strength * amplitudes).astype(kind))
 
 
 @lru_cache(maxsize=8)

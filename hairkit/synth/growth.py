@@ -250,8 +250,7 @@ def _cut(look: Style, paths: Float32Array, generator: np.random.Generator) -> Fl
     low = np.minimum(place.astype(np.int64), m - 2)
     t = (place - low)[..., None].astype(np.float32)
     rows = np.arange(count)[:, None]
-    cut: Float32Array = paths[rows, low] * (1 - t) + paths[rows, low + 1] * t
-    return cut
+    return np.asarray(paths[rows, low] * (1 - t) + paths[rows, low + 1] * t)
 
 
 def _clumps(
@@ -260,8 +259,7 @@ def _clumps(
     """Return (N,) the strand that leads each strand's clump: near, and combed to the same side."""
     place = roots.positions + CLUMP_REACH * start
     leaders = generator.permutation(len(roots))[: min(look.clumps, len(roots))]
-    nearest: Int64Array = leaders[cKDTree(place[leaders]).query(place)[1]]
-    return nearest
+    return np.asarray(leaders[cKDTree(place[leaders]).query(place)[1]])
 
 
 def _gather_clumps(

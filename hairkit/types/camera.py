@@ -72,14 +72,12 @@ class Camera(Stored):
     @property
     def position(self) -> Float64Array:
         """(3,) camera centre in the head frame (for an orthographic camera a point on its axis)."""
-        result: Float64Array = -self.rotation.T @ self.translation
-        return result
+        return np.asarray(-self.rotation.T @ self.translation)
 
     @property
     def forward(self) -> Float64Array:
         """(3,) unit optical axis in the head frame, away from the camera."""
-        result: Float64Array = self.rotation[2]
-        return result
+        return np.asarray(self.rotation[2])
 
     @property
     def azimuth_deg(self) -> float:
@@ -101,8 +99,7 @@ class Camera(Stored):
 
     def to_camera(self, points: npt.ArrayLike) -> Float64Array:
         """Transform head-frame points (..., 3) to camera coordinates (..., 3), metres."""
-        result: Float64Array = np.asarray(points, np.float64) @ self.rotation.T + self.translation
-        return result
+        return np.asarray(points, np.float64) @ self.rotation.T + self.translation
 
     def project(self, points: npt.ArrayLike) -> Float64Array:
         """Project head-frame points (..., 3) to pixels (..., 2).
@@ -117,8 +114,7 @@ class Camera(Stored):
         if self.model == "orthographic":
             return self.focal * local[..., :2] + self.centre
         depth = np.where(local[..., 2:] > 1e-9, local[..., 2:], np.nan)
-        pixels: Float64Array = self.focal * local[..., :2] / depth + self.centre
-        return pixels
+        return np.asarray(self.focal * local[..., :2] / depth + self.centre)
 
     def depth(self, points: npt.ArrayLike) -> Float64Array:
         """Distance of points (..., 3) along the optical axis, (...,), metres."""
@@ -132,8 +128,7 @@ class Camera(Stored):
         xy = (np.asarray(pixels, np.float64) - self.centre) / self.focal
         z = np.asarray(depth, np.float64)[..., None]
         local = np.concatenate([xy * z if self.model == "perspective" else xy + 0 * z, z], axis=-1)
-        result: Float64Array = (local - self.translation) @ self.rotation
-        return result
+        return np.asarray((local - self.translation) @ self.rotation)
 
     def rays(self, pixels: npt.ArrayLike) -> tuple[Float64Array, Float64Array]:
         """Return origins and unit directions, both (..., 3), of rays through `pixels` (..., 2)."""
@@ -146,8 +141,7 @@ class Camera(Stored):
         if self.model == "orthographic":
             return np.broadcast_to(self.forward, np.shape(points)).copy()
         toward = np.asarray(points, np.float64) - self.position
-        result: Float64Array = toward / np.linalg.norm(toward, axis=-1, keepdims=True)
-        return result
+        return np.asarray(toward / np.linalg.norm(toward, axis=-1, keepdims=True))
 
     def resized(self, width: int, height: int) -> Camera:
         """Return the same camera for its picture scaled to `width` x `height` px (equal aspect)."""

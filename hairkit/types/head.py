@@ -163,8 +163,7 @@ def vertex_normals(vertices: npt.ArrayLike, faces: Int32Array) -> Float64Array:
     at, sums = faces.T.ravel(), [np.tile(part, 3) for part in face_normals.T]
     total = np.stack([np.bincount(at, part, len(points)) for part in sums], axis=1)
     length = np.linalg.norm(total, axis=1, keepdims=True)
-    result: Float64Array = total / np.maximum(length, 1e-20)
-    return result
+    return np.asarray(total / np.maximum(length, 1e-20))
 
 
 def _carry_all(

@@ -153,8 +153,7 @@ class _TurnView:
 
     def depth(self, points: npt.ArrayLike) -> Float64Array:
         """Return the distance (...,) of points (..., 3) along the view."""
-        along: Float64Array = (np.asarray(points, np.float64) * self.view_direction(points)).sum(-1)
-        return along
+        return np.asarray((np.asarray(points, np.float64) * self.view_direction(points)).sum(-1))
 
 
 def _turn(points: npt.NDArray[np.float32]) -> list[_TurnView]:

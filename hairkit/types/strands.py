@@ -137,8 +137,7 @@ class Strands(Previewed, Stored):
         last = self.offsets[1:] - 1
         difference[last] = difference[last - 1]
         length = np.linalg.norm(difference, axis=1, keepdims=True)
-        result: Float32Array = (difference / np.maximum(length, 1e-12)).astype(np.float32)
-        return result
+        return np.asarray((difference / np.maximum(length, 1e-12)).astype(np.float32))
 
     def select(self, keep: npt.ArrayLike) -> Strands:
         """Return the strands that a mask (S,) or an index array picks, in that order."""

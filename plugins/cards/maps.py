@@ -82,8 +82,7 @@ def _directions(parts: Int8Array, *, outward: bool) -> UInt8Array:
 
 def _depth(atlas: Atlas) -> UInt8Array:
     height: Float32Array = np.where(np.isfinite(atlas.height), atlas.height, 0)
-    grey: UInt8Array = np.rint(255 * np.clip(0.5 + height / DEPTH, 0, 1)).astype(np.uint8)
-    return grey
+    return np.asarray(np.rint(255 * np.clip(0.5 + height / DEPTH, 0, 1)).astype(np.uint8))
 
 
 def _png(picture: UInt8Array) -> bytes:

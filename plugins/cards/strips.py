@@ -48,8 +48,7 @@ class Cards:
     def lengths(self) -> Float64Array:
         """Return (K,) lengths along the middle, metres."""
         steps = np.linalg.norm(np.diff(self.centre, axis=1), axis=2)
-        length: Float64Array = steps.sum(axis=1)
-        return length
+        return np.asarray(steps.sum(axis=1))
 
     def corners(self) -> Float32Array:
         """Return (K, M, 2, 3) the edges' points: at -across, then at +across."""
@@ -63,8 +62,7 @@ class Cards:
         quad = np.array([[0, 1, 3], [0, 3, 2]])
         strip = (first[:, None] + quad).reshape(-1, 3)
         every = strip + 2 * stations * np.arange(cards)[:, None, None]
-        triangles: Int32Array = every.reshape(-1, 3).astype(np.int32)
-        return triangles
+        return np.asarray(every.reshape(-1, 3).astype(np.int32))
 
 
 def make_cards(strands: Strands, lock: Int64Array, stations: int, middle: Float64Array) -> Cards:
@@ -121,8 +119,7 @@ def _extended(strands: Strands, lock: Int64Array, first: Int64Array, stations: i
     low = np.minimum(place.astype(np.int64), stations - 2)
     share = (place - low)[..., None]
     row = np.arange(len(strands))[:, None]
-    mixed: Float64Array = fine[row, low] * (1 - share) + fine[row, low + 1] * share
-    return mixed
+    return np.asarray(fine[row, low] * (1 - share) + fine[row, low + 1] * share)
 
 
 def _smoothed(values: Float64Array) -> Float64Array:

@@ -45,8 +45,7 @@ def noise_of(yaw_deg: float, size: float) -> Float64Array:
     """Return the standard deviation (68,) of landmarks in pixels, for a crop of `size` pixels."""
     front, oblique = _noise().T
     share = min(abs(yaw_deg) / OBLIQUE_DEG, 1.0)
-    noise: Float64Array = size * (front + share * (oblique - front))
-    return noise
+    return np.asarray(size * (front + share * (oblique - front)))
 
 
 @cache

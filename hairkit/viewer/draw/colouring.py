@@ -30,8 +30,7 @@ def ramp(values: npt.ArrayLike) -> Float32Array:
     place = np.clip(np.nan_to_num(np.asarray(values, np.float32)), 0, 1) * (len(_RAMP) - 1)
     low = np.minimum(place.astype(int), len(_RAMP) - 2)
     part = (place - low)[..., None]
-    mixed: Float32Array = _RAMP[low] * (1 - part) + _RAMP[low + 1] * part
-    return mixed
+    return np.asarray(_RAMP[low] * (1 - part) + _RAMP[low + 1] * part)
 
 
 def point_values(
