@@ -17,9 +17,9 @@ from hairkit.arrays import Float64Array
 from hairkit.cameras.landmark_equations import LandmarkEquations
 from hairkit.cameras.turntable import MIN_PERSPECTIVE, PER_VIEW, PERSPECTIVE, SHARED
 
-SETTLED, ROUGHLY, WORSE = 1e-3, 1e-2, 1e-9
-"""Stop when the cost falls by less than this share, the second one with blurred outlines; a step
-that costs more by the third share is taken back."""
+SETTLED, WORSE = 1e-3, 1e-9
+"""Stop when the cost falls by less than this share; a step that costs more by the second share
+is taken back."""
 FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e3
 """Of Levenberg-Marquardt, times the diagonal of the normal equations."""
 COARSE_TO_FINE = (8.0, 4.0, 2.0)
@@ -149,7 +149,7 @@ class Search:
                 if damping > MOST_DAMPING:
                     break
                 continue
-            settled = fit.cost - trial.cost < (SETTLED if noise <= 1 else ROUGHLY) * fit.cost
+            settled = fit.cost - trial.cost < SETTLED * fit.cost
             fit, here, damping = trial, there, damping / 5
             if settled:
                 break

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import cv2
 import numpy as np
@@ -68,22 +67,12 @@ class Outlines:
             whole,
         )
 
-    @cached_property
-    def rough(self) -> Outlines:
-        """Every second contour point, and fields of half as many rows, which fit a processor's
-        cache: for searches whose outlines are blurred anyway."""
-        count, height, width = self.fields.shape
-        height, width = height // 2, width // 2
-        even = self.fields[:, : 2 * height, : 2 * width].reshape(count, height, 2, width, 2)
-        fields, points, views = even.mean((2, 4)), self.points[::2].copy(), self.views[::2].copy()
-        return Outlines(fields, self.scale / 2, points, views, self.whole)
-
     def arranged(self, order: Int64Array) -> Outlines:
         """Return the outlines with the views in another order."""
-        views = np.argsort(order)[self.views]
-        mine = np.argsort(views, kind="stable")
-        fields, points = self.fields[order], self.points[mine]
-        return replace(self, fields=fields, points=points, views=views[mine])
+        mine = [np.flatnonzero(self.views == view) for view in order]
+        views = np.repeat(np.arange(len(order)), [len(each) for each in mine])
+        points = self.points[np.concatenate(mine)]
+        return replace(self, fields=self.fields[order], points=points, views=views)
 
     def crowns(self, ratio: float) -> tuple[Float64Array, Float64Array, Float64Array]:
         """Return each silhouette's top row, and middle column and width `ratio` widths below it.
@@ -156,4 +145,5 @@ def _to_edge(field: Float32Array, points: Float64Array) -> Float64Array:
     column, row = points.astype(int).T
     gradient = np.stack([column_slope[row, column], row_slope[row, column]], axis=1)
     length = np.maximum((gradient**2).sum(1, keepdims=True), LEAST_SLOPE)
-    return np.asarray(points - field[row, column][:, None] * gradient / length)
+    moved: Float64Array = points - field[row, column][:, None] * gradient / length
+    return moved

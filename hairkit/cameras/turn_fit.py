@@ -250,8 +250,10 @@ class TurnFit:
         """Return the evidence at a solution, with the outlines' noise times a number."""
         vector = fit.vector
         cameras, tangents = self.cameras(vector), self.turn.tangents(vector)
-        rows, residual, cost = self._coherence_rows(vector, cameras, tangents, coarseness)
+        noise = coarseness * self.noise
+        rows, residual, missed = self._coherence_rows(vector, cameras, tangents, noise)
         normal, right = rows.T @ rows, rows.T @ residual
+        cost = soft_l1_cost(missed)
         if self.focal is not None and not fit.flat:
             row, off = self._focal_row(vector, self.focal)
             normal, right = normal + np.outer(row, row), right + row * off
@@ -270,32 +272,29 @@ class TurnFit:
         return row / FOCAL_SPREAD, float(np.log(focal) - found) / FOCAL_SPREAD
 
     def _coherence_rows(
-        self, vector: Float64Array, cameras: CameraArrays, tangents: Float64Array, coarseness: float
-    ) -> tuple[Float64Array, Float64Array, float]:
+        self, vector: Float64Array, cameras: CameraArrays, tangents: Float64Array, noise: float
+    ) -> tuple[Float64Array, Float64Array, Float64Array]:
         """Return rows that bring contour rays into the silhouettes they miss, or nearly miss.
 
-        Then their right sides, and what the rays that miss cost.
+        Then their right sides, and by how much they miss, in standard deviations.
         """
-        outlines = self.outlines.rough if coarseness > 1 else self.outlines
-        noise = coarseness * self.noise
-        each = len(self.outlines.points) / max(len(outlines.points), 1)
-        value, slope = self._coherence(vector, cameras, noise, outlines)
+        value, slope = self._coherence(vector, cameras, noise)
         near = np.nonzero(value < NEAR * noise)[0]
         soft = SOFT * noise
         missed = np.logaddexp(0, -value[near] / soft) * soft / noise
         share = 1 / (1 + np.exp(value[near] / soft))
-        weight = np.sqrt(each * soft_l1_weight(missed))
-        rows = np.tensordot(slope[near], tangents, 2) * (share * weight / noise)[:, None]
-        return rows, missed * weight, soft_l1_cost(missed, each)
+        weight = np.sqrt(soft_l1_weight(missed))
+        rows = np.tensordot(slope[near], tangents, 2)
+        return rows * (share * weight / noise)[:, None], missed * weight, missed
 
     def _coherence(
-        self, vector: Float64Array, cameras: CameraArrays, noise: float, outlines: Outlines
+        self, vector: Float64Array, cameras: CameraArrays, noise: float
     ) -> tuple[Float64Array, Float64Array]:
         rotation, translation, *_ = cameras
         middle = np.full(len(rotation), 1 / max(float(vector[PERSPECTIVE]), MIN_PERSPECTIVE))
         if vector[PERSPECTIVE] <= MIN_PERSPECTIVE:  # there distances are zooms, metres apart
             middle = (rotation @ vector[CENTRE] + translation)[:, 2]
-        return coherence(outlines, *cameras, middle, SOFT_MIN * noise)
+        return coherence(self.outlines, *cameras, middle, SOFT_MIN * noise)
 
     def residual_px(self, fit: Fit) -> float:
         """Return the root mean square misfit of landmarks and missed contour rays, pixels.
@@ -303,7 +302,7 @@ class TurnFit:
         Landmarks with more than the median noise count less, as they do in the fit.
         """
         cameras = self.cameras(fit.vector)
-        value, _ = self._coherence(fit.vector, cameras, self.noise, self.outlines)
+        value, _ = self._coherence(fit.vector, cameras, self.noise)
         misfit = value[value < 0]
         weight = np.ones(len(misfit))
         if self.landmarks is not None:

@@ -68,16 +68,6 @@ def test_the_kernel_finds_what_a_plain_search_finds(bust: Turntable, outlines: O
     assert (value > want - 0.3).all()
 
 
-def test_rough_outlines_say_nearly_the_same(bust: Turntable, outlines: Outlines) -> None:
-    """Half as many rows of the fields change every second point's ray by a pixel or less."""
-    whole, _ = coherence(outlines, *_arrays(bust), MIDDLE)
-    rough, _ = coherence(outlines.rough, *_arrays(bust), MIDDLE)
-    doubtful = whole[::2] < 10
-    assert doubtful.sum() > 20
-    assert np.median(np.abs(rough - whole[::2])[doubtful]) < 0.5
-    assert np.percentile(np.abs(rough - whole[::2])[doubtful], 95) < 2
-
-
 def test_values_do_not_jump(bust: Turntable, outlines: Outlines) -> None:
     """Cameras that move by a micrometre change no ray by a twentieth of a pixel."""
     rotation, translation, focal, centre = _arrays(bust)

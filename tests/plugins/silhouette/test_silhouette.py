@@ -232,6 +232,6 @@ def test_zooms_and_distances_of_orthographic_views_are_the_same(bust: Turntable)
     nearer[SHARED + 3 :: PER_VIEW] = distances = np.linspace(-0.05, 0.05, 8)
     rotation, translation, focal, centre = problem.cameras(vector)
     longer = (rotation, translation, focal * np.exp(-distances), centre)
-    by_distance, _ = problem._coherence(nearer, problem.cameras(nearer), 3.0, problem.outlines)
-    by_lens, _ = problem._coherence(vector, longer, 3.0, problem.outlines)
+    by_distance, _ = problem._coherence(nearer, problem.cameras(nearer), 3.0)
+    by_lens, _ = problem._coherence(vector, longer, 3.0)
     assert np.abs(by_distance - by_lens).mean() < 0.1
