@@ -10,12 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import cv2
 import numpy as np
 
-from hairkit.arrays import Float32Array
+from hairkit.arrays import Float32Array, UInt8Array
 
 REACH = 40.0
 """Texels beyond which the result follows the mean rather than the gradients: 40 mm."""
+BAND = 3.0
+"""Sigma between coarse colours and details, texels: 3 mm."""
 LEAST = 1e-6
 """Least weight that is divided by."""
 
@@ -49,6 +52,20 @@ def join_gradients(
     factor = (waves[0][:, None] + waves[1][None] + 1 / REACH**2).astype(np.float32)
     solved = idctn(dctn(wanted, axes=(0, 1)) / factor[..., None], axes=(0, 1))
     return np.asarray(solved, np.float32)
+
+
+def smooth_seen(
+    picture: Float32Array | UInt8Array, weight: Float32Array, gain: Float32Array
+) -> Float32Array:
+    """Return (H, W, 3) a picture times its gain (3,) without details, of what has weight alone."""
+    smooth = np.zeros(picture.shape, np.float32)
+    part = smallest_window(weight, round(4 * BAND))
+    within = (weight[part] > 0).astype(np.float32)
+    if within.any():
+        blurred = cv2.GaussianBlur(picture[part] * gain * within[..., None], (0, 0), BAND)
+        share = cv2.GaussianBlur(within, (0, 0), BAND)
+        smooth[part] = blurred / np.maximum(share, LEAST)[..., None]
+    return smooth
 
 
 def smallest_window(weight: Float32Array, margin: int = 0) -> tuple[slice, slice]:

@@ -30,7 +30,7 @@ from hairkit.head_model.delighting import find_shading
 from hairkit.head_model.exposures import FLOOR, even_exposures
 from hairkit.head_model.eye_colours import find_eye_colours, mark_beside_eyes
 from hairkit.head_model.eyes import has_default_eyes, paint_over
-from hairkit.head_model.gradient_blend import join_gradients, smallest_window
+from hairkit.head_model.gradient_blend import join_gradients, smallest_window, smooth_seen
 from hairkit.head_model.skin_tones import LEAST, extend_tones, like_skin
 from hairkit.parallel import thread_count
 from hairkit.types.camera import Camera
@@ -53,8 +53,6 @@ HIDDEN = 0.004
 MARGIN, HAIR_MARGIN = 0.004, 0.008
 """Metres of skin beside the outline and beside hair that are left out: masks and cameras are not
 exact, and fine strands and their shadow lie beside the mask."""
-BAND = 3.0
-"""Sigma between the two bands, texels of the coarse maps: 3 mm on the face."""
 SHARPNESS = 8
 """Power of the weights from which details are taken: nearly the best view alone."""
 WELL, OTHER_FACES = 0.3, 1e-6
@@ -269,15 +267,13 @@ def _blend(
     best = np.maximum(np.max([view.weight for view in views], axis=0), LEAST)
     face = int(np.argmax([(view.weight * features).sum() for view in views]))
     others = np.clip(1 - views[face].weight / WELL, OTHER_FACES, 1)
-    shares = [
-        (view.weight / best) ** SHARPNESS * (1 if k == face else others)
-        for k, view in enumerate(views)
-    ]
+    shares = [others * (view.weight / best) ** SHARPNESS for view in views]
+    shares[face] /= others
     shares = [np.where(share < LEAST_SHARE, 0, share) for share in shares]
     share_sum = np.maximum(np.sum(shares, axis=0), LEAST)
     shares = [np.asarray(share / share_sum, np.float32) for share in shares]
     factors = gains.astype(np.float32)
-    smooth = [_smooth(view, factor) for view, factor in zip(views, factors, strict=True)]
+    smooth = [smooth_seen(v.coarse, v.weight, f) for v, f in zip(views, factors, strict=True)]
     mean, taken = (np.zeros((COARSE, COARSE, 3), np.float32) for _ in range(2))
     for low, view, share in zip(smooth, views, shares, strict=True):
         part = smallest_window(view.weight)
@@ -334,18 +330,6 @@ def _enlarge_rows(picture: Float32Array, rows: slice) -> Float32Array:
     part = picture[first : bottom + 1]
     larger = cv2.resize(part, None, fx=times, fy=times, interpolation=cv2.INTER_LINEAR)
     return np.asarray(larger[(top - first) * times : (bottom - first) * times], np.float32)
-
-
-def _smooth(view: _Seen, gain: Float32Array) -> Float32Array:
-    """Return (C, C, 3) colours without details, of what the view sees alone."""
-    smooth = np.zeros(view.coarse.shape, np.float32)
-    part = smallest_window(view.weight, round(4 * BAND))
-    within = (view.weight[part] > 0).astype(np.float32)
-    if within.any():
-        blurred = cv2.GaussianBlur(view.coarse[part] * gain * within[..., None], (0, 0), BAND)
-        share = cv2.GaussianBlur(within, (0, 0), BAND)
-        smooth[part] = blurred / np.maximum(share, LEAST)[..., None]
-    return smooth
 
 
 def _shrink(picture: Float32Array, width: int) -> Float32Array:
