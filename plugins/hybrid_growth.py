@@ -101,7 +101,10 @@ class Options(FinishOptions):
         0.9, low=0, high=0.99, doc="Share of the previous direction in the next step's."
     )
     cover: float = option(
-        2.0, low=0, high=10, doc="Density of strands led to hair that none reaches; 0 for none."
+        2.0,
+        low=0,
+        high=10,
+        doc="Density, over the mean, of strands led to hair none reaches; 0: off.",
     )
     wave_share: float = option(
         0.18, low=0, high=1, doc="Share of a wave's pitch over which strands keep direction."

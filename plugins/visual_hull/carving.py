@@ -22,7 +22,7 @@ EMPTY, PERSON, HAIR, HIDDEN = 0, 1, 2, 3
 hides the cell."""
 BEYOND = 0.05
 """Metres that hair may go on beyond a picture's sides or top that cut it off; hair may hang down
-farther. Without a bound wide hair became a star, deepest where the fewest views see."""
+farther. Without a bound the hull of wide hair is deepest where the fewest views see it."""
 
 
 class LabelledView(NamedTuple):

@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from hairkit_plugins.hybrid_growth import BELOW, LEFT, Options, grow, signed_volume, track
+from hairkit_plugins.hybrid_growth import BELOW, BLIND, LEFT, Options, grow, signed_volume, track
 
 from hairkit.arrays import Float32Array
 from hairkit.field.growth_prior import measure_scalp_distance
@@ -44,18 +44,21 @@ def constant(way: tuple[float, float, float]) -> OrientationField:
     return OrientationField(GRID, np.zeros((*GRID.shape, 6)), zero, zero, direction, zero)
 
 
+STARTS = np.array([[0.0, 0, 0], [0.05, 0.02, -0.03]], np.float32)
+
+
 def run(
-    field: OrientationField, distance: Float32Array, options: Options, way: float = 0.1
+    field: OrientationField,
+    distance: Float32Array,
+    options: Options,
+    way: float = 0.1,
+    starts: Float32Array = STARTS,
+    **rest: float,
 ) -> Strands:
+    """Strands whose ways through the hair are all `way` long."""
     assert field.direction is not None
-    starts = np.array([[0.0, 0, 0], [0.05, 0.02, -0.03]], np.float32)
-    return grow(
-        field,
-        signed_volume(field, field.direction, distance),
-        starts,
-        np.full(len(starts), way),
-        options,
-    )
+    volume = signed_volume(field, field.direction, distance)
+    return grow(field, volume, starts, np.full(len(starts), way), options, **rest)
 
 
 def test_strands_follow_the_sign_of_the_field() -> None:
@@ -90,22 +93,21 @@ def test_no_strand_ends_on_its_blind_way() -> None:
     np.testing.assert_allclose(found.lengths(), 0.02, atol=2e-3)
 
 
+def test_the_blind_way_of_short_hair_is_short() -> None:
+    """It is `BLIND` times the hair's way at most."""
+    outside = np.full(GRID.shape, 3.0, np.float32)
+    found = run(constant((0, 1, 0)), outside, replace(FREE, blind=0.02, reach=5.0), way=0.008)
+    np.testing.assert_allclose(found.lengths(), BLIND * 0.008, atol=2e-3)
+
+
 def test_strands_slide_along_the_surface_they_meet_at_a_small_angle() -> None:
     """With sliding they run on along x beyond I = 1; at a large angle they leave and end."""
     distance = (1 + 10 * GRID.centres()[..., 1]).astype(np.float32)
     options = replace(FREE, slide_sine=0.35, reach=1.0, inertia=0.0, blind=0.0, bound=1.5)
     starts = np.array([[-0.1, -0.005, 0.0]], np.float32)
     flat, steep = (
-        grow(
-            field,
-            signed_volume(field, field.direction, distance),
-            starts,
-            np.full(len(starts), 0.15),
-            options,
-            early=0,
-        )
+        run(field, distance, options, 0.15, starts, early=0)
         for field in (constant((0.97, 0.24, 0)), constant((0.5, 0.87, 0)))
-        if field.direction is not None
     )
     assert flat.tips[0, 0] > 0.03
     assert flat.tips[0, 1] < 0.012
@@ -126,17 +128,8 @@ def test_strands_that_meet_the_shoulders_turn_where_the_hair_goes_on(
     distance = (1 - 10 * GRID.centres()[..., 1]).astype(np.float32)
     options = replace(FREE, slide_sine=0.35, reach=1.0, inertia=0.0, blind=0.0, bound=1.3)
     starts = np.array([[-0.05, 0.03, 0.0]], np.float32)
-    field = falling(growth)
-    assert field.direction is not None
     below, above = (
-        grow(
-            field,
-            signed_volume(field, field.direction, distance),
-            starts,
-            np.full(len(starts), 0.15),
-            options,
-            height,
-        ).tips[0]
+        run(falling(growth), distance, options, 0.15, starts, shoulders=height).tips[0]
         for height in (0.05, -0.1)
     )
     np.testing.assert_allclose(above, [-0.05, -0.03, 0], atol=2e-3)
@@ -153,12 +146,9 @@ def test_long_hair_is_no_stub_where_it_leaves_near_its_root(way: float, turns: b
     distance = (1 + 10 * GRID.centres()[..., 1]).astype(np.float32)
     growth = (GRID.centres() @ [1.0, 0.2, 0]).astype(np.float32)
     field = replace(constant((0, 1, 0)), growth=growth)
-    assert field.direction is not None
     options = replace(FREE, slide_sine=0.35, reach=1.0, blind=0.0)
     starts = np.array([[-0.1, -0.02, 0.0]], np.float32)
-    grown = grow(
-        field, signed_volume(field, field.direction, distance), starts, np.full(1, way), options
-    )
+    grown = run(field, distance, options, way, starts)
     length, height = grown.lengths()[0], grown.tips[0, 1]
     assert length > 0.1 if turns else 0.008 < height < 0.013
 

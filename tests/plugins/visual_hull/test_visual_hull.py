@@ -381,7 +381,7 @@ def test_the_same_masks_give_the_same_hull() -> None:
         assert getattr(first, name).tobytes() == getattr(second, name).tobytes()
 
 
-def test_wide_hair_that_pictures_cut_off_becomes_no_star() -> None:
+def test_wide_hair_that_pictures_cut_off_ends_near_them() -> None:
     """Pictures of the middle alone: hair goes on beyond them by `BEYOND`, whoever sees it not."""
     half, (scene, masks) = 0.1, views_of(curtains)
     left, right = (WIDTH // 2 + side * round(half / PIXEL) for side in (-1, 1))
