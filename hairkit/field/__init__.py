@@ -7,6 +7,7 @@ What field and tracking plugins share: fusing views, priors, diffusion, and samp
 * `find_parting`: where the parting is, as the user says or the views show
 * `find_ties`: where hair is tied, and the tube of the tail
 * `growth_prior`: geodesic distances from scalp and tips, and a direction prior
+* `hair_depth`: how far away the hair in one photo is, told by a network
 * `hanging_hair`: the field of tight curls
 * `isosurface`: the smooth surface of a volume of cells
 * `parting`: how hair on the crown is combed from its parting

@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from hairkit.arrays import Float32Array, Float64Array, unit_vectors
-from hairkit.cameras.depth_raster import SPLAT_CELLS, depth_behind, head_depth, point_depth
-from hairkit.field.cell_shells import dense_surface, dilate_cells
+from hairkit.cameras.depth_raster import depth_behind, head_depth, point_depth
+from hairkit.field.cell_shells import dilate_cells
 from hairkit.field.growth_prior import (
     LONG_HAIR,
     chamfer_distance,
@@ -38,9 +38,9 @@ SURFACE_CELLS = 3.0
 """Standard deviation in cells over which the hull's surface is smoothed."""
 SURFACE_WEIGHT = 0.5
 """Weight of the surface's plane over that of the views' planes."""
-SEEN_DEPTH, SEEN_SHARE = 0.01, 0.25
-"""Depth behind the first hair of a view at which a point still counts as seen, metres; and share
-of its points by which a strand does."""
+SEEN_DEPTH, SEEN_SHARE, STRAND_REACH = 0.01, 0.25, 0.006
+"""Depth behind the first hair of a view at which a point still counts as seen, metres; share of its
+points by which a strand does; and half the width of the hair that a guide stands for, metres."""
 BESIDE, LEAST_SHOWN = 0.03, 0.01
 """Metres from the middle at which hair lies beside the crown; least share of the scalp, facing the
 view, whose hair is seen there."""
@@ -122,15 +122,14 @@ def group_seen(strands: Strands, evidence: Evidence) -> Strands:
     """Return the strands in two groups, `SEEN` and `CONTINUED`; as they are of a whole turn.
 
     Of those seen `SEEN_SHARE` of the points lie where a view sees hair, at most `SEEN_DEPTH` behind
-    its front.
+    the first strand.
     """
-    scene, hull = evidence.scene, evidence.hull
+    scene = evidence.scene
     if not scene.one_sided:
         return strands
-    surface = dense_surface(hull)
     seen = np.zeros(len(strands.points), bool)
     for camera, mask in zip(scene.cameras, evidence.masks, strict=True):
-        hair = point_depth(camera, surface, SPLAT_CELLS * hull.grid.spacing)
+        hair = point_depth(camera, strands.points, STRAND_REACH)
         front = np.minimum(hair, head_depth(scene.head, camera))
         front[~mask.hair] = -np.inf
         seen |= depth_behind(camera, front, strands.points) < SEEN_DEPTH

@@ -251,7 +251,9 @@ class Findings:
     @result_of(HULL)
     def hull(self) -> Given[Hull]:
         """The volume that hair fills."""
-        return self.run.once(HULL, scene=self.scene, masks=self.masks)
+        return self.run.once(
+            HULL, scene=self.scene, masks=self.masks, orientations=self.orientations
+        )
 
     @result_of(DISTANCE)
     def scalp_distance(self) -> Given[ScalpDistance]:

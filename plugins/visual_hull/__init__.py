@@ -24,7 +24,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
-from hairkit import Camera, Head, Hull, Mask, Scene, VoxelGrid, hookimpl
+from hairkit import Camera, Head, Hull, Mask, OrientationMap, Scene, VoxelGrid, hookimpl
 from hairkit.arrays import BoolArray, Float32Array, UInt8Array
 from hairkit.cameras.depth_raster import SPLAT_CELLS, head_depth, mesh_depth, splat_depth
 from hairkit.cameras.projection_kernels import pack_camera
@@ -108,12 +108,17 @@ class Options:
 
 
 @hookimpl
-def build_hull(scene: Scene, masks: tuple[Mask, ...], options: Options) -> Hull:
+def build_hull(
+    scene: Scene,
+    masks: tuple[Mask, ...],
+    orientations: tuple[OrientationMap, ...],
+    options: Options,
+) -> Hull:
     """Carve the masks in a grid of `voxel_size` cells around the hair."""
     views = _Views.of(scene, masks, options)
     torso = _torso(scene, masks, options)
     dressed = views if torso is None else views.in_front_of(torso)
-    shell = Shell.of(scene, masks, torso) if views.mirrored else None
+    shell = Shell.of(scene, masks, orientations, torso) if views.mirrored else None
     grid = _grid_around_hair(scene, dressed, torso, shell, options)
     if torso is not None and grid.origin[1] < torso.top:
         views = dressed

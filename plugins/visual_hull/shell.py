@@ -1,9 +1,11 @@
-"""How far hair stands off the head where no photo shows it: as far as it does at the outlines.
+"""How far hair stands off the head where photos of one side do not bound it.
 
-One photo, or a few from one side, bound the hair across their views and not along them. Hair lies
-about the head as a shell, and its outline shows the shell's thickness at the two bearings beside
-each view, at every height, down to the hair's ends. In between it is interpolated around the head.
-The mirrored photo counts where the photo itself sees nothing: heads are alike on both sides.
+One photo, or a few from one side, bound the hair across their views and not along them. Where a
+photo sees hair, it is between the depths that a network tells (`hairkit.field.hair_depth`).
+Elsewhere it lies about the head as a shell. Its outline shows the shell's thickness at the two
+bearings beside each view, at every height, down to the hair's ends; in between it is interpolated
+around the head. The mirrored photo counts where the photo itself sees nothing: heads are alike on
+both sides.
 """
 
 from __future__ import annotations
@@ -14,8 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import ndimage
 
-from hairkit import Camera, Mask, Scene, VoxelGrid
+from hairkit import Camera, Mask, OrientationMap, Scene, VoxelGrid
 from hairkit.arrays import BoolArray, Float64Array
+from hairkit.field.hair_depth import HairDepth, guess_hair_depth, head_middle
 from hairkit.head_model.torso import Torso
 
 CAP = 0.1
@@ -42,13 +45,6 @@ LYING = 0.015
 CHIN = -0.15
 """Height below the head's middle down to which outlines show how thick hair hangs, metres: further
 down it spreads over the shoulders."""
-HOLLOW = np.cos(np.radians(100.0))
-"""Cosine of the bearing up to which hair beside the face hangs as a curtain; behind, it fills all
-the room to the nape."""
-CURTAIN = 0.025
-"""Least thickness of that curtain, metres."""
-HANGS_BACK = 0.01
-"""How far behind that edge hair hangs freely below the chin, metres."""
 CUT_OFF = 0.1
 """How far hair goes on that the picture's lower edge cuts off, metres. Fronts of eight heads, cut
 off below the chin, have F at 4 mm/40 of 55.9 (length 0.55) without it, 61.0 (0.71) with 0.075, 60.6
@@ -56,8 +52,6 @@ off below the chin, have F at 4 mm/40 of 55.9 (length 0.55) without it, 61.0 (0.
 """
 FACE = 0.4
 """Cosine of the bearing up to which an outline is that of the face."""
-FACING = 0.3
-"""Least cosine between a view and the head's surface on which it shows hair."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,16 +62,21 @@ class Shell:
     """(3,) of the cranium, metres."""
     limit: Float64Array
     """(BEARINGS, rows) largest radius of hair, metres; negative where none is."""
-    hollow: Float64Array
-    """(BEARINGS, rows) radius up to which there is none, metres."""
     sides: tuple[tuple[float, Float64Array], ...]
     """Bearing (radians) of each outline, and its radius (rows,)."""
+    depths: tuple[HairDepth, ...]
+    """How far away the hair is that each view sees."""
 
     @classmethod
-    def of(cls, scene: Scene, masks: Sequence[Mask], torso: Torso | None) -> Shell:
+    def of(
+        cls,
+        scene: Scene,
+        masks: Sequence[Mask],
+        orientations: Sequence[OrientationMap],
+        torso: Torso | None,
+    ) -> Shell:
         """Return the shell that the outlines of all views show."""
-        scalp = scene.head.vertices[scene.head.scalp > 0.5].astype(np.float64)
-        middle = (scalp.min(axis=0) + scalp.max(axis=0)) / 2
+        middle = head_middle(scene.head)
         head = _radii(scene.head.vertices - middle)
         hang = _hang(head)
         sides = tuple(
@@ -86,33 +85,33 @@ class Shell:
             for side in np.radians(camera.azimuth_deg) + np.array([-1, 1]) * np.pi / 2
         )
         thickness, there = _between(sides, hang)
-        limit = np.minimum(hang + thickness, _front(scalp - middle, thickness))
-        ahead = np.cos(_bearings())[:, None] > HOLLOW
-        below = _heights() < scalp[scalp[:, 2] > middle[2], 1].min() - middle[1]
-        hollow = np.where(ahead & below, np.minimum(hang, hang + thickness - CURTAIN), 0.0)
-        lying = head + np.clip(thickness, 0, LYING)
-        seen = ahead & (head > 0) & _shows_hair(scene.cameras, masks, middle, head)
-        limit, hollow = np.where(seen, np.maximum(limit, lying), limit), np.where(seen, 0, hollow)
+        limit = hang + thickness
         if torso is not None:
             limit = np.maximum(limit, _radii(torso.mesh()[0] - middle) + LYING)
-        return cls(middle, np.where(there, limit, -1.0), hollow, sides)
+        depths = tuple(
+            guess_hair_depth(scene.head, *view)
+            for view in zip(scene.cameras, masks, orientations, strict=True)
+        )
+        return cls(middle, np.where(there, limit, -1.0), sides, depths)
 
     def inside(self, grid: VoxelGrid) -> BoolArray:
         """Return the cells (X, Y, Z) in which there may be hair."""
         points = grid.centres_of(np.ones(grid.shape, bool)) - self.middle
         bearing, row, radius = _place(points)
-        limit, hollow = (
-            ndimage.map_coordinates(
-                np.pad(table, ((0, 1), (0, 0)), "wrap"), [bearing, row], order=1, mode="nearest"
-            )
-            for table in (self.limit, self.hollow)
+        limit = ndimage.map_coordinates(
+            np.pad(self.limit, ((0, 1), (0, 0)), "wrap"), [bearing, row], order=1, mode="nearest"
         )
-        found = (radius <= limit) & (radius >= hollow)
+        found = radius <= limit
         for side, outline in self.sides:
             across = points @ np.array([np.sin(side), 0.0, np.cos(side)])
             width = np.interp(row, np.arange(len(outline)), outline)
             found &= (across <= width) | (_tells_nothing(side) & (width == 0))
-        return np.asarray(found.reshape(grid.shape))
+        views, deep = np.zeros(len(points), int), np.zeros(len(points))
+        for depth in self.depths:
+            seen, inwards = depth.within(points + self.middle)
+            views += seen
+            deep += np.where(seen, inwards, 0)
+        return np.asarray(np.where(views, deep >= 0, found).reshape(grid.shape))
 
 
 def _heights() -> Float64Array:
@@ -149,24 +148,6 @@ def _hang(head: Float64Array) -> Float64Array:
     return radii
 
 
-def _front(scalp: Float64Array, thickness: Float64Array) -> Float64Array:
-    """Return the radius (BEARINGS, rows) of the plane before which no hair hangs.
-
-    It lies before the front edge of the scalp (N, 3), and of its lowest point at the sides.
-    """
-    heights = _heights()
-    front = scalp[scalp[:, 2] > 0]
-    rows = np.rint(_place(front)[1]).astype(int)
-    edge = np.full(len(heights), -np.inf)
-    np.maximum.at(edge, rows, front[:, 2])
-    known = np.flatnonzero(np.isfinite(edge))
-    edge = np.interp(np.arange(len(edge)), known, edge[known])
-    ahead = np.cos(_bearings())[:, None] * np.cos(np.maximum(heights, 0) / CAP)
-    hangs = np.clip(heights / CHIN, 0, 1)
-    with_hair = edge + (1 - hangs) * np.maximum(thickness, 0) - hangs * HANGS_BACK
-    return np.where(ahead > 1e-3, with_hair / np.maximum(ahead, 1e-3), np.inf)
-
-
 def _bearings() -> Float64Array:
     """Return the columns' bearings, radians."""
     return (np.arange(BEARINGS) / BEARINGS - 0.5) * 2 * np.pi
@@ -175,19 +156,6 @@ def _bearings() -> Float64Array:
 def _column(bearing: float) -> int:
     """Return the column of a bearing in radians."""
     return round((bearing / (2 * np.pi) + 0.5) * BEARINGS) % BEARINGS
-
-
-def _shows_hair(
-    cameras: Sequence[Camera], masks: Sequence[Mask], middle: Float64Array, head: Float64Array
-) -> BoolArray:
-    """Return where (BEARINGS, rows) some view that the head's surface faces has hair on it."""
-    out = np.stack([_outwards(bearing) for bearing in _bearings()])
-    points = middle + _feet() + head[..., None] * out
-    found = np.zeros(head.shape, bool)
-    for camera, mask in zip(cameras, masks, strict=True):
-        facing = -(out * camera.view_direction(points)).sum(axis=-1) > FACING
-        found |= facing & _hair_at(camera, mask, points)
-    return found
 
 
 def _hair_at(camera: Camera, mask: Mask, points: Float64Array) -> BoolArray:

@@ -42,9 +42,9 @@ POOR = 0.12
 """Share of the pictures in parts of which the person is uncertain."""
 
 
-def new_weights(seed: int) -> dict[str, Tensor]:
+def new_weights(seed: int, channels: int = CHANNELS) -> dict[str, Tensor]:
     """Return kernels (C out, C in, k, k) and biases (C out,) of every layer, by its name."""
-    shapes = {"entry": (WIDTHS[0], CHANNELS, 3), "first": (WIDTHS[0], WIDTHS[0], 3)}
+    shapes = {"entry": (WIDTHS[0], channels, 3), "first": (WIDTHS[0], WIDTHS[0], 3)}
     for level, (fine, coarse) in enumerate(pairwise(WIDTHS)):
         shapes[f"down{level}a"] = (coarse, fine, 3)
         shapes[f"down{level}b"] = (coarse, coarse, 3)

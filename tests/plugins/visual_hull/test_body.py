@@ -67,8 +67,8 @@ def test_a_fitted_torso_is_taken_out_of_the_hull() -> None:
     lies deep in the body, and the hair that lies outside of it stays; the grid is smaller then."""
     scene, masks = people(clothes=True)
     options = Options(voxel_size=0.008, opening=0.0)
-    filled = build_hull(scene, masks, replace(options, cut_body=False))
-    carved = build_hull(scene, masks, options)
+    filled = build_hull(scene, masks, (), replace(options, cut_body=False))
+    carved = build_hull(scene, masks, (), options)
     assert filled.torso is None
     assert carved.torso is not None
     true = Torso.under(scene.head)
@@ -88,6 +88,8 @@ def test_without_clothes_the_hull_stays_as_it_is() -> None:
     """Where no view shows clothes, asking for the body to be cut changes no cell."""
     scene, masks = people(clothes=False)
     options = Options(voxel_size=0.012, opening=0.0)
-    one, other = (build_hull(scene, masks, replace(options, cut_body=cut)) for cut in (True, False))
+    one, other = (
+        build_hull(scene, masks, (), replace(options, cut_body=cut)) for cut in (True, False)
+    )
     np.testing.assert_array_equal(one.loose, other.loose)
     np.testing.assert_array_equal(one.dense, other.dense)

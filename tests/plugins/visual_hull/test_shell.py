@@ -6,15 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hairkit_plugins.visual_hull import Options, build_hull
+from hairkit_plugins.visual_hull import Options, build_hull, shell
 from hairkit_plugins.visual_hull.shell import CUT_OFF
 
 from hairkit.cameras.depth_raster import head_depth
+from hairkit.field.hair_depth import HairDepth
 from hairkit.head_model.template import default_head
 from hairkit.types.camera import Camera
+from hairkit.types.head import Head
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Mask
+from hairkit.types.orientation import OrientationMap
 from hairkit.types.scene import Scene
-from hairkit.types.volume import Hull
 
 WIDTH, HEIGHT = 270, 360
 THICK, LOW = 0.02, -0.12
@@ -35,6 +37,7 @@ def photo(azimuth: float = 0.0, aside: float = 0.0) -> tuple[Scene, tuple[Mask, 
     wide = 0.0884 + THICK + aside * (side > 0)
     up = np.maximum(across[..., 1], 0) / (0.07 + THICK)
     hair = ((side / wide) ** 2 + up**2 < 1) & (across[..., 1] > LOW)
+    hair &= (across[..., 2] < 0.06) | (across[..., 1] > 0.04)  # none before a profile's face
     person = np.isfinite(depth)
     skin = camera.unproject(np.stack([x, y], axis=-1), np.where(person, depth, 1.0))
     bare = person & (skin[..., 2] > 0.01) & (skin[..., 1] < 0.04)
@@ -43,19 +46,41 @@ def photo(azimuth: float = 0.0, aside: float = 0.0) -> tuple[Scene, tuple[Mask, 
     return Scene(("photo",), (camera,), head), (Mask(labels, True),)
 
 
-def cells(hull: Hull) -> np.ndarray:
-    """Centres (N, 3) of the dense cells."""
+def cells(scene: Scene, masks: tuple[Mask, ...]) -> np.ndarray:
+    """Centres (N, 3) of the dense cells; no strand's direction is known."""
+    blank = [np.zeros(mask.labels.shape, np.float32) for mask in masks]
+    maps = tuple(OrientationMap(each, each) for each in blank)
+    hull = build_hull(scene, masks, maps, OPTIONS)
     return hull.grid.centres_of(hull.dense).astype(np.float64)
 
 
 def test_hair_behind_is_as_thick_as_beside() -> None:
     """What the photo does not show stands off the head as far as its outline, and is as long."""
-    found = cells(build_hull(*photo(), OPTIONS))
+    found = cells(*photo())
     level = found[np.abs(found[:, 1]) < 0.01]
     back = -default_head().vertices[:, 2].min()
     assert -level[:, 2].min() - back == pytest.approx(THICK, abs=0.008)
     behind = found[found[:, 2] < -0.07]
     assert behind[:, 1].min() == pytest.approx(LOW, abs=0.015)
+
+
+def test_hair_that_is_seen_lies_between_the_depths_that_are_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Cells behind the photo's hair follow the network, and not the outline's thickness."""
+    scene, masks = photo()
+
+    def guess(head: Head, camera: Camera, mask: Mask, known: OrientationMap) -> HairDepth:
+        at = float(camera.depth([0.0, 0.0, 0.0]))
+        near, far = (np.full(mask.labels.shape, at + d, np.float32) for d in (-0.03, 0.05))
+        return HairDepth(camera, mask.hair, near, far)
+
+    monkeypatch.setattr(shell, "guess_hair_depth", guess)
+    found = cells(scene, masks)
+    x, y = np.floor(scene.cameras[0].project(found)).astype(int).T
+    seen = found[masks[0].hair[y, x]]
+    assert seen[:, 2].max() == pytest.approx(0.03, abs=2 * OPTIONS.voxel_size)
+    assert seen[:, 2].min() == pytest.approx(-0.05, abs=2 * OPTIONS.voxel_size)
 
 
 @pytest.mark.parametrize("height", [-0.08, -0.1])
@@ -64,7 +89,7 @@ def test_hair_that_the_lower_edge_cuts_off_goes_on(height: float) -> None:
     scene, masks = photo()
     edge = round(float(scene.cameras[0].project([0.1, height, 0.0])[1]))
     cropped = replace(scene, cameras=(replace(scene.cameras[0], height=edge),))
-    found = cells(build_hull(cropped, (Mask(masks[0].labels[:edge], True),), OPTIONS))
+    found = cells(cropped, (Mask(masks[0].labels[:edge], True),))
     behind = found[found[:, 2] < -0.07]
     assert behind[:, 1].min() == pytest.approx(height - CUT_OFF, abs=0.02)
 
@@ -76,8 +101,8 @@ def test_hair_that_the_upper_edge_cuts_off_is_as_thick_as_below() -> None:
     camera = scene.cameras[0]
     cropped = replace(camera, height=HEIGHT - edge, centre=camera.centre - np.array([0.0, edge]))
     labels = masks[0].labels[edge:]
-    whole = cells(build_hull(scene, masks, OPTIONS))
-    found = cells(build_hull(replace(scene, cameras=(cropped,)), (Mask(labels, True),), OPTIONS))
+    whole = cells(scene, masks)
+    found = cells(replace(scene, cameras=(cropped,)), (Mask(labels, True),))
     for beside in (0.0, 0.05):
         top, true = (each[np.abs(each[:, 0] - beside) < 0.01, 1].max() for each in (found, whole))
         assert top == pytest.approx(true, abs=0.01)
@@ -86,7 +111,7 @@ def test_hair_that_the_upper_edge_cuts_off_is_as_thick_as_below() -> None:
 def test_seen_skin_stays_bare() -> None:
     """No cell lies before the face, nor beside what the photo shows of the hair."""
     scene, masks = photo()
-    found = cells(build_hull(scene, masks, OPTIONS))
+    found = cells(scene, masks)
     assert not ((found[:, 2] > 0.07) & (found[:, 1] < 0.0)).any()
     x, y = np.floor(scene.cameras[0].project(found)).astype(int).T
     assert np.mean(masks[0].labels[y, x] == BACKGROUND) < 0.05
@@ -97,7 +122,7 @@ def test_the_mirrored_photo_has_the_mirrored_hull() -> None:
     scene, masks = photo(aside=0.02)
     mirrored = Mask(masks[0].labels[:, ::-1], True)
     other = replace(scene, cameras=(scene.cameras[0].mirrored(),))
-    widths = [np.quantile(cells(build_hull(*each, OPTIONS))[:, 0], [0.01, 0.99])
+    widths = [np.quantile(cells(*each)[:, 0], [0.01, 0.99])
               for each in ((scene, masks), (other, (mirrored,)))]  # fmt: skip
     assert widths[0] == pytest.approx(-widths[1][::-1], abs=0.008)
     assert widths[0][1] > -widths[0][0] + 0.01
@@ -106,7 +131,7 @@ def test_the_mirrored_photo_has_the_mirrored_hull() -> None:
 @pytest.mark.parametrize("azimuth", [90.0, 180.0])
 def test_side_and_back_give_a_whole_head_of_hair(azimuth: float) -> None:
     """From the side, or from behind, hair covers both sides of the head and no face."""
-    found = cells(build_hull(*photo(azimuth), OPTIONS))
+    found = cells(*photo(azimuth))
     assert (found[:, 0] > 0.08).any()
     assert (found[:, 0] < -0.08).any()
     face = (found[:, 2] > 0.09) & (np.abs(found[:, 1] + 0.05) < 0.04)

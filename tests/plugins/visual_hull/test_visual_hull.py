@@ -141,7 +141,7 @@ def test_the_hull_holds_the_true_hair(solid: Solid, labels: bool, model: CameraM
     This holds where masks tell the person from the background, and where they know hair only.
     """
     scene, masks = views_of(solid, model, labels)
-    hull = build_hull(scene, masks, COARSE)
+    hull = build_hull(scene, masks, (), COARSE)
     wanted = true_cells(hull, solid)
     assert wanted.sum() > 100
     assert hull.loose[wanted].all()
@@ -151,7 +151,7 @@ def test_the_hull_holds_the_true_hair(solid: Solid, labels: bool, model: CameraM
 def test_the_hull_is_no_larger_than_silhouettes_allow() -> None:
     """A cell of the hull projects onto hair, or onto the head that hides it, in every view."""
     scene, masks = views_of(cap)
-    hull = build_hull(scene, masks, COARSE)
+    hull = build_hull(scene, masks, (), COARSE)
     points = hull.grid.centres()[hull.dense]
     for camera, mask in zip(scene.cameras, masks, strict=True):
         column, row = np.floor(camera.project(points)).astype(int).T
@@ -164,7 +164,7 @@ def test_the_hull_is_no_larger_than_silhouettes_allow() -> None:
 def test_dense_is_part_of_loose_and_loose_near_dense(labels: bool) -> None:
     """Loose reaches at most `loose_cells` beyond dense, but for the shell over the scalp."""
     scene, masks = views_of(cap, labels=labels)
-    hull = build_hull(scene, masks, replace(COARSE, opening=14.0, slack=14.0, loose_cells=2))
+    hull = build_hull(scene, masks, (), replace(COARSE, opening=14.0, slack=14.0, loose_cells=2))
     assert (hull.loose | ~hull.dense).all()
     far = hull.loose & ~ndimage.binary_dilation(hull.dense, iterations=2)
     assert hull.head_distance[far].max(initial=0) < 2 * COARSE.voxel_size
@@ -174,7 +174,7 @@ def test_wisps_are_loose_and_not_dense() -> None:
     """A lock that stands off, two pixels wide, is opened away; the body of the hair is not."""
     scene, masks = views_of(cap_with_a_lock)
     options = replace(COARSE, voxel_size=0.004, opening=14.0, loose_cells=5)
-    hull = build_hull(scene, masks, options)
+    hull = build_hull(scene, masks, (), options)
     lock = [[0.02, y, 0.0] for y in (0.145, 0.15)]
     assert held(hull, hull.loose, np.array(lock)).all()
     assert not held(hull, hull.dense, np.array(lock)).any()
@@ -184,7 +184,7 @@ def test_wisps_are_loose_and_not_dense() -> None:
 def test_roots_lie_in_the_hull() -> None:
     """A shell over the scalp is loose even where no hair was seen on it."""
     scene, masks = views_of(plait)
-    hull = build_hull(scene, masks, COARSE)
+    hull = build_hull(scene, masks, (), COARSE)
     scalp = scene.head.vertices[scene.head.scalp > 0.5].astype(np.float64)
     assert held(hull, hull.loose, 1.01 * scalp).all()
 
@@ -192,9 +192,9 @@ def test_roots_lie_in_the_hull() -> None:
 def test_no_hair_is_inside_the_head() -> None:
     """Dense cells are outside of it; left in by the option, they are not."""
     scene, masks = views_of(curtains)
-    hull = build_hull(scene, masks, COARSE)
+    hull = build_hull(scene, masks, (), COARSE)
     assert hull.head_distance[hull.dense].min() > 0
-    whole = build_hull(scene, masks, replace(COARSE, cut_head=False))
+    whole = build_hull(scene, masks, (), replace(COARSE, cut_head=False))
     assert whole.head_distance[whole.dense].min() < -0.02
 
 
@@ -202,12 +202,12 @@ def test_no_hair_is_inside_the_head() -> None:
 def test_leaving_out_a_view_lets_the_hull_grow(view: int) -> None:
     """One silhouette less can empty no cell; the same holds for votes that must be unanimous."""
     scene, masks = views_of(cap)
-    full = build_hull(scene, masks, COARSE)
-    fewer = build_hull(*without(scene, masks, view), COARSE)
+    full = build_hull(scene, masks, (), COARSE)
+    fewer = build_hull(*without(scene, masks, view), (), COARSE)
     assert lost((full, full.loose), (fewer, fewer.loose)) == 0
     votes = replace(COARSE, mode="votes")
-    all_of_them = build_hull(scene, masks, replace(votes, min_views=8))
-    rest = build_hull(*without(scene, masks, view), replace(votes, min_views=7))
+    all_of_them = build_hull(scene, masks, (), replace(votes, min_views=8))
+    rest = build_hull(*without(scene, masks, view), (), replace(votes, min_views=7))
     assert lost((all_of_them, all_of_them.dense), (rest, rest.dense)) == 0
 
 
@@ -216,7 +216,7 @@ def test_asking_fewer_views_lets_the_hull_grow(mode: str) -> None:
     """With one vote less to win no cell is lost."""
     scene, masks = views_of(cap)
     hulls = [
-        build_hull(scene, masks, replace(COARSE, mode=mode, min_views=n)) for n in (8, 5, 4, 2)
+        build_hull(scene, masks, (), replace(COARSE, mode=mode, min_views=n)) for n in (8, 5, 4, 2)
     ]
     for small, large in itertools.pairwise(hulls):
         assert lost((small, small.dense), (large, large.dense)) == 0
@@ -227,7 +227,7 @@ def test_votes_are_the_count_of_masks() -> None:
     """A cell is in the thesis's hull exactly when enough pictures have hair at its pixel."""
     scene, masks = views_of(plait)
     options = replace(COARSE, mode="votes", min_views=4, slack=0.0, cut_head=False)
-    hull = build_hull(scene, masks, options)
+    hull = build_hull(scene, masks, (), options)
     centres = hull.grid.centres().astype(np.float64)
     votes = np.zeros(hull.grid.shape, int)
     for camera, mask in zip(scene.cameras, masks, strict=True):
@@ -245,7 +245,7 @@ def test_erosions_then_dilations_open_the_voted_hull() -> None:
     scene, masks = views_of(plait)
     votes = replace(COARSE, mode="votes", min_views=4, cut_head=False)
     plain, opened, eroded = (
-        build_hull(scene, masks, replace(votes, erosions=e, dilations=d)).dense
+        build_hull(scene, masks, (), replace(votes, erosions=e, dilations=d)).dense
         for e, d in ((0, 0), (1, 1), (1, 0))
     )
     np.testing.assert_array_equal(opened, ndimage.binary_opening(plain))
@@ -257,8 +257,8 @@ def test_what_a_view_sees_in_front_of_the_face_is_not_hair() -> None:
     scene, masks = views_of(curtains)
     x, y = np.meshgrid(np.linspace(-0.03, 0.03, 7), np.linspace(-0.04, 0.04, 7))
     window = np.stack([x, y, np.full(x.shape, 0.12)], axis=-1)
-    votes = build_hull(scene, masks, replace(COARSE, mode="votes", min_views=2))
-    labels = build_hull(scene, masks, COARSE)
+    votes = build_hull(scene, masks, (), replace(COARSE, mode="votes", min_views=2))
+    labels = build_hull(scene, masks, (), COARSE)
     assert held(votes, votes.dense, window).mean() > 0.8
     assert not held(labels, labels.loose, window).any()
 
@@ -268,15 +268,15 @@ def test_skin_that_nearer_views_see_bare_bears_no_layer_of_hair() -> None:
     scene, masks = views_of(cap)
     head = replace(scene.head, vertices=0.95 * scene.head.vertices)
     fine = replace(COARSE, voxel_size=0.004, front_margin=0.012)
-    hull = build_hull(replace(scene, head=head), masks, fine)
+    hull = build_hull(replace(scene, head=head), masks, (), fine)
     assert hull.grid.centres_of(hull.dense)[:, 2].max() < 0.08
 
 
 def test_forgiving_a_view_keeps_more() -> None:
     """One view may err: no cell is lost by it, and a view with a wrong mask does no harm."""
     scene, masks = views_of(cap)
-    strict = build_hull(scene, masks, replace(COARSE, forgive=0))
-    kind = build_hull(scene, masks, replace(COARSE, forgive=1))
+    strict = build_hull(scene, masks, (), replace(COARSE, forgive=0))
+    kind = build_hull(scene, masks, (), replace(COARSE, forgive=1))
     assert lost((strict, strict.loose), (kind, kind.loose)) == 0
     assert kind.loose.sum() > strict.loose.sum()
     labels = masks[2].labels.copy()
@@ -285,16 +285,16 @@ def test_forgiving_a_view_keeps_more() -> None:
     wanted = true_cells(kind, cap)
     points = kind.grid.centres()[wanted].astype(np.float64)
     for forgive, right in ((0, False), (1, True)):
-        hull = build_hull(scene, wrong, replace(COARSE, forgive=forgive))
+        hull = build_hull(scene, wrong, (), replace(COARSE, forgive=forgive))
         assert (held(hull, hull.loose, points).mean() > 0.995) == right
 
 
 def test_the_misfit_of_the_scene_decides_whether_to_forgive() -> None:
     """Left to itself the hull forgives a view where the cameras are known to be off, else none."""
     scene, masks = views_of(cap)
-    strict, kind = (build_hull(scene, masks, replace(COARSE, forgive=n)) for n in (0, 1))
+    strict, kind = (build_hull(scene, masks, (), replace(COARSE, forgive=n)) for n in (0, 1))
     for residual, wanted in ((None, strict), (0.5, strict), (50.0, kind)):
-        hull = build_hull(replace(scene, residual_px=residual), masks, COARSE)
+        hull = build_hull(replace(scene, residual_px=residual), masks, (), COARSE)
         assert hull.loose.sum() == wanted.loose.sum()
 
 
@@ -316,7 +316,7 @@ def test_hair_beyond_the_border_of_a_picture_is_kept() -> None:
     short = replace(scene, cameras=tuple(cameras))
     low = np.array([0.0, -0.17, -0.12])
     assert cameras[2].project(low)[1] > HEIGHT - 40
-    kept, lost_there = (build_hull(short, tuple(seen), COARSE) for seen in (cut, ended))
+    kept, lost_there = (build_hull(short, tuple(seen), (), COARSE) for seen in (cut, ended))
     assert held(kept, kept.dense, low)
     assert not held(lost_there, lost_there.loose, low)
 
@@ -327,8 +327,8 @@ def test_pictures_of_several_sizes_carve_together() -> None:
     big = scene.cameras[3].resized(2 * WIDTH, 2 * HEIGHT)
     cameras = (*scene.cameras[:3], big, *scene.cameras[4:])
     mixed = (*masks[:3], drawn(big, cap), *masks[4:])
-    one = build_hull(scene, masks, COARSE)
-    other = build_hull(replace(scene, cameras=cameras), mixed, COARSE)
+    one = build_hull(scene, masks, (), COARSE)
+    other = build_hull(replace(scene, cameras=cameras), mixed, (), COARSE)
     assert other.dense.sum() == pytest.approx(one.dense.sum(), rel=0.03)
 
 
@@ -345,10 +345,10 @@ def test_masks_that_call_everything_hair_bound_the_work(
 ) -> None:
     """Whole photos of hair are carved in larger cells, and a warning says so."""
     scene, masks = views_of(cap)
-    assert build_hull(scene, masks, Options()).grid.spacing == Options().voxel_size
+    assert build_hull(scene, masks, (), Options()).grid.spacing == Options().voxel_size
     assert caplog.text == ""
     everything = tuple(Mask(np.full_like(mask.labels, 255), True) for mask in masks)
-    hull = build_hull(scene, everything, Options())
+    hull = build_hull(scene, everything, (), Options())
     assert np.count_nonzero(hull.loose) * Options().voxel_size ** 3 < 1.3 * MOST_HAIR
     assert "litres of hair" in caplog.text
 
@@ -363,20 +363,20 @@ def test_masks_that_do_not_overlap_in_space_are_an_error() -> None:
         labels[120:130, 60:70] = BACKGROUND if i % 2 else HAIR
         bare.append(Mask(labels, True))
     with pytest.raises(InputError, match=r"^the hull is empty.*check masks and cameras$"):
-        build_hull(scene, tuple(bare), COARSE)
+        build_hull(scene, tuple(bare), (), COARSE)
 
 
 def test_a_mask_for_every_camera_is_needed() -> None:
     """Both numbers are named."""
     scene, masks = views_of(cap)
     with pytest.raises(InputError, match="8 cameras but 7 masks"):
-        build_hull(scene, masks[1:], COARSE)
+        build_hull(scene, masks[1:], (), COARSE)
 
 
 def test_the_same_masks_give_the_same_hull() -> None:
     """Cell by cell."""
     scene, masks = views_of(curtains)
-    first, second = (build_hull(scene, masks, COARSE) for _ in range(2))
+    first, second = (build_hull(scene, masks, (), COARSE) for _ in range(2))
     for name in ("dense", "loose", "head_distance"):
         assert getattr(first, name).tobytes() == getattr(second, name).tobytes()
 
@@ -390,6 +390,6 @@ def test_wide_hair_that_pictures_cut_off_ends_near_them() -> None:
         for c in scene.cameras
     ]
     narrow = tuple(Mask(np.ascontiguousarray(mask.labels[:, left:right]), True) for mask in masks)
-    hull = build_hull(replace(scene, cameras=tuple(cameras)), narrow, COARSE)
+    hull = build_hull(replace(scene, cameras=tuple(cameras)), narrow, (), COARSE)
     across = np.linalg.norm(hull.grid.centres_of(hull.loose)[:, [0, 2]], axis=1)
     assert half + BEYOND < across.max() < (half + BEYOND) / np.cos(np.pi / 8) * 1.2
