@@ -35,8 +35,7 @@ from hairkit.simulation.rigid_motion import (
 from hairkit.simulation.simulator import Measures, Surroundings
 from hairkit.simulation.substeps import Course, StepArrays, make_steps
 from hairkit.simulation.vectors import Floats
-from hairkit.simulation.wind import air_velocity
-from hairkit.simulation.wind_shadow import passing_wind, wind_losses
+from hairkit.simulation.wind_shadow import wind_losses
 from hairkit.types.groom import Groom
 from hairkit.types.node_options import NodeOptions
 
@@ -151,7 +150,8 @@ class NodeSimulator(GuideSimulator):
         self._mass = 0.5 * (bars[:, 1:] + bars[:, :-1])
         self._near = self._bodies.at(self._nodes)[0]
         hair = self._hair_grid = make_hair_grid(self._nodes, self._mass)
-        self._loss = wind_losses(hair, len(strands), SPACING * self._density.mean(), self._bodies)
+        strand = SPACING * self._density.mean()
+        self._shadow = wind_losses(hair, len(strands), strand, self._bodies), hair.origin
         self._held = held_lengths(self._groom) / np.maximum(strands.lengths(), 1e-9)
 
     def _tune(self, options: NodeOptions) -> None:
@@ -209,18 +209,12 @@ class NodeSimulator(GuideSimulator):
         return points
 
     def _air(self, around: Surroundings, head: Float64Array) -> Float64Array:
-        """Return the air velocity at the nodes, world: what passes hair and head, and all gusts.
-
-        Gusts are those where the head carries the nodes. Both are interpolated from some nodes.
-        """
-        wind = np.asarray(around.wind, np.float64)
-        if not wind.any():
-            return wind
-        nodes = self._nodes.shape[1]
+        """Return the air velocity at the nodes, world, interpolated from some of them."""
+        if not np.any(around.wind):
+            return np.zeros(3)
+        nodes, options = self._nodes.shape[1], self._options
         some = np.unique(np.append(np.arange(0, nodes, APART), nodes - 1))
         share = np.stack([np.interp(np.arange(nodes), some, row) for row in np.eye(len(some))], 1)
-        places, seed = self._nodes[:, some].astype(np.float32), self._options.seed
-        air = air_velocity(places, self._time, wind, around.turbulence, seed, head)
-        own, now = wind @ head[:3, :3], self._now()[0][:, :, some].reshape(-1, 3)[: air.size // 3]
-        passing = passing_wind(self._loss, self._hair_grid.origin, now, own, self._options.drag)
-        return share @ (air - (1 - passing.reshape(*air.shape[:2], 1)) * wind)
+        places, now = self._nodes[:, some].astype(np.float32), self._now()[0][:, :, some]
+        air = self._air_at(places, now.reshape(-1, 3), around, head, options.drag, options.seed)
+        return np.asarray(share @ air)

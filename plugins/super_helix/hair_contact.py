@@ -29,14 +29,12 @@ class Neighbours:
         """Keep the density at rest: `rest` (E, NODES, 3) in the head frame."""
         self._masses = np.ascontiguousarray(masses.ravel())
         points = np.ascontiguousarray(rest.reshape(-1, 3))
-        low, size = np.zeros(3), np.zeros(3, np.int64)
-        if len(points):
-            low = points.min(axis=0) - ROOM
-            size = np.minimum((points.max(axis=0) + ROOM - low) / CELL, WIDEST).astype(np.int64) + 2
+        low = points.min(axis=0) - ROOM
+        size = np.minimum((points.max(axis=0) + ROOM - low) / CELL, WIDEST).astype(np.int64) + 2
         self._cells, self._corners = Cells(low, 1 / CELL), np.zeros((*size, 4))
         found = self._around(points, np.zeros_like(points), 1.0)
         self._rest = found[:, 0]
-        self._floor = float(np.median(self._rest)) if len(found) else 1.0
+        self._floor = float(np.median(self._rest))
 
     def act(
         self,
@@ -82,11 +80,10 @@ class Neighbours:
         `floor`.
         """
         result = np.empty((len(points), 7))
-        if len(points):
-            nodes = points[None, None], velocity[None, None], self._masses[None, None]
-            spread_nodes(0, 1, *nodes, np.zeros((3, 4)), self._cells, self._corners[None])
-            gather(points, self._cells, self._corners, floor, result)
-            clear(points, self._cells, self._corners)
+        nodes = points[None, None], velocity[None, None], self._masses[None, None]
+        spread_nodes(0, 1, *nodes, np.zeros((3, 4)), self._cells, self._corners[None])
+        gather(points, self._cells, self._corners, floor, result)
+        clear(points, self._cells, self._corners)
         return result
 
 

@@ -11,9 +11,10 @@ from hairkit.options import fill_options
 from hairkit.parallel import parallel_for
 from hairkit.simulation import Measures, Surroundings
 from hairkit.simulation.guide_simulator import FRAME, KERATIN, GuideSimulator
+from hairkit.simulation.hair_grid import SPACING, make_hair_grid
 from hairkit.simulation.held_guides import held_lengths
 from hairkit.simulation.rigid_motion import follow_head, interpolate_motion
-from hairkit.simulation.wind import air_velocity
+from hairkit.simulation.wind_shadow import wind_losses
 from hairkit.types.groom import Groom
 
 from .binding import bind_rods, carry_points
@@ -66,6 +67,9 @@ class SuperHelices(GuideSimulator):
         self._motion = Motion(q.copy(), q.copy(), rest, rest.copy(), still, still.copy())
         own = (rest - head[:3, 3]) @ head[:3, :3]
         self._gap = np.minimum(SKIN, self._bodies.at(own)[0])
+        hair, strand = make_hair_grid(own, self._rods.masses), SPACING * self._rods.density.mean()
+        self._shadow = wind_losses(hair, len(self.strands), strand, self._bodies), hair.origin
+        self._middle = own[:, NODES // 2, None]
         self._neighbours = Neighbours(own, self._rods.masses)
         self._rest_energy = self._potential(own, q, self._rest_gravity)
 
@@ -121,10 +125,12 @@ class SuperHelices(GuideSimulator):
         self._time += seconds
 
     def _air(self, around: Surroundings) -> Float64Array:
-        """Return (E, NODES, 3) the air's velocity, gusts taken at the middle of each element."""
-        middle = np.ascontiguousarray(self._motion.points[:, NODES // 2])
-        air = air_velocity(middle, self._time, around.wind, around.turbulence)
-        return np.repeat(air[:, None], NODES, axis=1)
+        """Return (E, NODES, 3) the air's velocity, taken at the middle of each element."""
+        if not np.any(around.wind):
+            return np.zeros_like(self._motion.points)
+        now = (self._motion.points[:, NODES // 2] - self._head[:3, 3]) @ self._head[:3, :3]
+        air = self._air_at(self._middle, now, around, self._head, self._options.air_drag)
+        return np.repeat(air, NODES, axis=1)
 
     def _loads(self, around: Surroundings, air: Float64Array) -> Loads:
         motion, masses = self._motion, self._rods.masses
