@@ -121,7 +121,7 @@ def test_gusts_pass_the_head(name: str, manager: Manager) -> None:
     """What is held back of the air at the nodes is a share of the mean wind, and no gust."""
     simulator = manager.call("make_simulator", name, groom=bristle_groom())
     wind, tail = np.array([3.0, 0.0, 1.0]), () if name == "super_helix" else (STILL,)
-    rest = simulator._middle if name == "super_helix" else simulator._nodes[:, ::15]
+    rest = simulator._at_rest[:, 1:2] if name == "super_helix" else simulator._nodes[:, ::15]
     held = [
         simulator._air(Surroundings(wind=wind, turbulence=gusts), *tail)[:, ::15]
         - air_velocity(rest, 0.0, wind, gusts)
