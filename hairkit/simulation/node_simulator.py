@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.arrays import Float64Array
+from hairkit.arrays import Float64Array, Int64Array
 from hairkit.parallel import parallel_for
 from hairkit.simulation.embedding import (
     FIRM,
@@ -40,7 +40,8 @@ from hairkit.types.groom import Groom
 from hairkit.types.node_options import NodeOptions
 
 APART = 4
-"""Nodes between those at which air is evaluated: shorter than half a gust is long."""
+"""Nodes between those at which the air, and what hair does beside hair, is evaluated: shorter than
+half a gust is long."""
 
 
 class NodeSimulator(GuideSimulator):
@@ -57,6 +58,10 @@ class NodeSimulator(GuideSimulator):
     """(S, n) kilograms."""
     _pull: Float64Array
     """(S, n) squared frequency of the pull to rest, 1/s^2."""
+    _some: Int64Array
+    """Every `APART`th node and the last."""
+    _share: Float64Array
+    """(n, k) by which values at those nodes are interpolated."""
     _still: Any
     """The state at rest."""
 
@@ -138,6 +143,9 @@ class NodeSimulator(GuideSimulator):
     def _place_nodes(self, nodes: int) -> None:
         """Place nodes along the guides; measure the captured distance to the obstacles."""
         strands, width = self.strands, self.strands.widths
+        some = self._some = np.unique(np.append(np.arange(0, nodes, APART), nodes - 1))
+        shares = [np.interp(np.arange(nodes), some, row) for row in np.eye(len(some))]
+        self._share = np.stack(shares, axis=1)
         self._nodes = node_points(strands, nodes)
         self._length = np.linalg.norm(np.diff(self._nodes, axis=1), axis=-1)
         self._segment = float(np.median(self._length))
@@ -212,9 +220,7 @@ class NodeSimulator(GuideSimulator):
         """Return the air velocity at the nodes, world, interpolated from some of them."""
         if not np.any(around.wind):
             return np.zeros(3)
-        nodes, options = self._nodes.shape[1], self._options
-        some = np.unique(np.append(np.arange(0, nodes, APART), nodes - 1))
-        share = np.stack([np.interp(np.arange(nodes), some, row) for row in np.eye(len(some))], 1)
-        places, now = self._nodes[:, some].astype(np.float32), self._now()[0][:, :, some]
-        air = self._air_at(places, now.reshape(-1, 3), around, head, options.drag, options.seed)
-        return np.asarray(share @ air)
+        places, now = self._nodes[:, self._some], self._now()[0][:, :, self._some].reshape(-1, 3)
+        drag, seed = self._options.drag, self._options.seed
+        air = self._air_at(places.astype(np.float32), now, around, head, drag, seed)
+        return np.asarray(self._share @ air)

@@ -72,7 +72,8 @@ class RodSimulator(NodeSimulator):
         contact = Contact(self._bodies, near, friction, options.depenetration, options.rounds)
         exact = options.backend == "reference"
         self._engine = Engine(rods, contact, np.float64 if exact else np.float32)
-        self._beside = self._now()[0].copy()
+        self._beside = self._now()[0][:, :, self._some]
+        self._beside_mass = self._engine.mass[:, :, self._some]
 
     def _stiffen(self, options: Options) -> Rods:
         """Return the rods, whose natural shape balances what weight nothing else bears."""
@@ -128,9 +129,9 @@ class RodSimulator(NodeSimulator):
 
         Chang, Jin and Yu ("A practical model for hair mutual interactions", 2002) join guides so.
         """
-        moved = self._now()[0] - self._beside
-        mean, rates = moved.copy(), (np.inf, 0.0, 1.0)
-        self._hair_grid.mix(self._beside, mean, self._engine.mass, np.eye(4), rates)
+        moved = self._now()[0][:, :, self._some] - self._beside
+        mean, nodes = moved.copy(), (self._beside_mass, np.eye(4))
+        self._hair_grid.mix(self._beside, mean, *nodes, (np.inf, 0.0, 1.0))
         apart = (mean - moved).reshape(-1, *moved.shape[2:])[: len(self._nodes)]
-        force: Float64Array = self._options.adhesion * self.rods.mass[..., None] * apart
-        return force
+        pull = self._options.adhesion * self.rods.mass[..., None]
+        return np.asarray(pull * (self._share @ apart), np.float64)
