@@ -141,7 +141,8 @@ def filmed(groom: Groom, film: Film, using: str) -> tuple[PointCache, str]:
     simulator.reset(heads[0])
     for frame, head in enumerate(heads):
         wind = np.array(film.wind) * (times[frame] <= MOVING)
-        simulator.advance(FRAME if frame else 0.0, Surroundings(head, wind, GUSTS))
+        if frame:
+            simulator.advance(FRAME, Surroundings(head, wind, GUSTS))
         points.append(simulator.points)
         depth = depth if frame % MEASURED else max(depth, simulator.measure().depth)
     cache = PointCache(np.array(points), times, heads)

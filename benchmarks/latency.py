@@ -34,6 +34,8 @@ from hairkit.io.capture_reader import sample_folder
 
 GUIDES = 600
 LONGEST_MS = 300_000
+WARM = 1
+"""Starts of the viewer that are not counted: the first one compiles."""
 QUIET_S = 2.0
 """Seconds after the whole hair was made, before the next thing is done."""
 BROWSER = [
@@ -278,8 +280,8 @@ def _measure_viewer(groom: Path, repeats: int) -> None:
     with _screen() as screen:
         for (what, pictures), soft in itertools.product(seen.items(), (True, False)):
             command = [sys.executable, "-c", START.format(pictures=pictures, soft=soft), *words]
-            runs = [_run(command, screen) for _ in range(repeats + 1)]  # the first one compiles
-            clock, busy = (statistics.median(column) for column in zip(*runs[1:], strict=True))
+            runs = [_run(command, screen) for _ in range(WARM + repeats)]
+            clock, busy = (statistics.median(column) for column in zip(*runs[WARM:], strict=True))
             drawn = "processor" if soft else "shaders"
             print(f"| {what}, by {drawn} | {clock:.2f} | {busy:.2f} |", flush=True)
 

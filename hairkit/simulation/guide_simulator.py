@@ -9,12 +9,16 @@ import numpy as np
 import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array, frozen_array, read_only
+from hairkit.errors import InputError
 from hairkit.grooming.guide_weights import guide_mask
 from hairkit.parallel import parallel_for
 from hairkit.simulation.obstacle_kernels import Drawn, Points, draw_points
 from hairkit.simulation.obstacles import NO_BODIES, Bodies, groom_bodies
 from hairkit.simulation.rigid_motion import inverse_motion, transform_points
 from hairkit.simulation.simulator import Surroundings, check_grabs
+from hairkit.simulation.vectors import Floats
+from hairkit.simulation.wind import air_velocity
+from hairkit.simulation.wind_shadow import passing_wind
 from hairkit.types.groom import Groom
 from hairkit.types.strands import Strands
 
@@ -44,10 +48,13 @@ class GuideSimulator(ABC):
     """Where the hand of each held point is, (3,) metres, world."""
     _points: Float32Array | None
     """Those last asked for; None after a motion."""
+    _shadow: tuple[Floats, Float64Array]
+    """What hair and head take of the wind: `wind_losses`, and where their first cell is."""
 
     def __init__(self, groom: Groom, contact: bool = True) -> None:
-        touching = contact and len(groom.strands) > 0
-        self._bodies: Bodies = groom_bodies(groom) if touching else NO_BODIES
+        if not len(groom.strands):
+            raise InputError("the groom holds no strands, so there is nothing to simulate")
+        self._bodies: Bodies = groom_bodies(groom) if contact else NO_BODIES
         self._groom = groom.select(guide_mask(groom.strands))
         self._drawn = drawn_at_rest(self._groom.strands, self._bodies)
         self._rest_gravity = np.array([0.0, -groom.physics.gravity, 0.0])
@@ -100,6 +107,26 @@ class GuideSimulator(ABC):
     def _gravity(self, around: Surroundings) -> Float64Array:
         """Return gravity (3,), world."""
         return self._rest_gravity if around.gravity is None else around.gravity
+
+    def _air_at(
+        self,
+        rest: Points,
+        now: Points,
+        around: Surroundings,
+        head: Float64Array,
+        drag: float,
+        seed: int = 0,
+    ) -> Float64Array:
+        """Return the air's velocity (S, n, 3), world: what passes hair and head, and all gusts.
+
+        Gusts are those where the head carries `rest` (S, n, 3); `now` (S n or more, 3) are the
+        places where the wind passes, head axes. The wind is not 0.
+        """
+        wind = np.asarray(around.wind, np.float64)
+        air = air_velocity(rest, self._time, wind, around.turbulence, seed, head)
+        places, own = now[: air.size // 3], wind @ head[:3, :3]
+        passing = passing_wind(*self._shadow, places, own, drag).reshape(*air.shape[:2], 1)
+        return air - (1 - passing) * wind
 
     def _torso_from_head(self) -> Float64Array:
         """Return the motion (4, 4) from the head axes to the torso's."""

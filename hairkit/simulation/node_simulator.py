@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from hairkit.arrays import Float64Array
+from hairkit.arrays import Float64Array, Int64Array
 from hairkit.parallel import parallel_for
 from hairkit.simulation.embedding import (
     FIRM,
@@ -35,13 +35,13 @@ from hairkit.simulation.rigid_motion import (
 from hairkit.simulation.simulator import Measures, Surroundings
 from hairkit.simulation.substeps import Course, StepArrays, make_steps
 from hairkit.simulation.vectors import Floats
-from hairkit.simulation.wind import air_velocity
-from hairkit.simulation.wind_shadow import passing_wind, wind_losses
+from hairkit.simulation.wind_shadow import wind_losses
 from hairkit.types.groom import Groom
 from hairkit.types.node_options import NodeOptions
 
 APART = 4
-"""Nodes between those at which air is evaluated: shorter than half a gust is long."""
+"""Nodes between those at which the air, and what hair does beside hair, is evaluated: shorter than
+half a gust is long."""
 
 
 class NodeSimulator(GuideSimulator):
@@ -58,6 +58,10 @@ class NodeSimulator(GuideSimulator):
     """(S, n) kilograms."""
     _pull: Float64Array
     """(S, n) squared frequency of the pull to rest, 1/s^2."""
+    _some: Int64Array
+    """Every `APART`th node and the last."""
+    _share: Float64Array
+    """(n, k) by which values at those nodes are interpolated."""
     _still: Any
     """The state at rest."""
 
@@ -139,6 +143,9 @@ class NodeSimulator(GuideSimulator):
     def _place_nodes(self, nodes: int) -> None:
         """Place nodes along the guides; measure the captured distance to the obstacles."""
         strands, width = self.strands, self.strands.widths
+        some = self._some = np.unique(np.append(np.arange(0, nodes, APART), nodes - 1))
+        shares = [np.interp(np.arange(nodes), some, row) for row in np.eye(len(some))]
+        self._share = np.stack(shares, axis=1)
         self._nodes = node_points(strands, nodes)
         self._length = np.linalg.norm(np.diff(self._nodes, axis=1), axis=-1)
         self._segment = float(np.median(self._length))
@@ -151,7 +158,8 @@ class NodeSimulator(GuideSimulator):
         self._mass = 0.5 * (bars[:, 1:] + bars[:, :-1])
         self._near = self._bodies.at(self._nodes)[0]
         hair = self._hair_grid = make_hair_grid(self._nodes, self._mass)
-        self._loss = wind_losses(hair, len(strands), SPACING * self._density.mean(), self._bodies)
+        strand = SPACING * self._density.mean()
+        self._shadow = wind_losses(hair, len(strands), strand, self._bodies), hair.origin
         self._held = held_lengths(self._groom) / np.maximum(strands.lengths(), 1e-9)
 
     def _tune(self, options: NodeOptions) -> None:
@@ -209,18 +217,10 @@ class NodeSimulator(GuideSimulator):
         return points
 
     def _air(self, around: Surroundings, head: Float64Array) -> Float64Array:
-        """Return the air velocity at the nodes, world: what passes hair and head, and all gusts.
-
-        Gusts are those where the head carries the nodes. Both are interpolated from some nodes.
-        """
-        wind = np.asarray(around.wind, np.float64)
-        if not wind.any():
-            return wind
-        nodes = self._nodes.shape[1]
-        some = np.unique(np.append(np.arange(0, nodes, APART), nodes - 1))
-        share = np.stack([np.interp(np.arange(nodes), some, row) for row in np.eye(len(some))], 1)
-        places, seed = self._nodes[:, some].astype(np.float32), self._options.seed
-        air = air_velocity(places, self._time, wind, around.turbulence, seed, head)
-        own, now = wind @ head[:3, :3], self._now()[0][:, :, some].reshape(-1, 3)[: air.size // 3]
-        passing = passing_wind(self._loss, self._hair_grid.origin, now, own, self._options.drag)
-        return share @ (air - (1 - passing.reshape(*air.shape[:2], 1)) * wind)
+        """Return the air velocity at the nodes, world, interpolated from some of them."""
+        if not np.any(around.wind):
+            return np.zeros(3)
+        places, now = self._nodes[:, self._some], self._now()[0][:, :, self._some].reshape(-1, 3)
+        drag, seed = self._options.drag, self._options.seed
+        air = self._air_at(places.astype(np.float32), now, around, head, drag, seed)
+        return np.asarray(self._share @ air)

@@ -5,7 +5,9 @@ Each layer is read from the work folder of `hairkit reconstruct` when it is firs
 
 from __future__ import annotations
 
+import os
 from functools import cached_property
+from itertools import product
 from pathlib import Path
 from typing import TypeVar
 
@@ -18,7 +20,7 @@ from hairkit.field.isosurface import volume_surface
 from hairkit.manager import Manager
 from hairkit.pipeline.find_views import frame_photos
 from hairkit.pipeline.recipe import load_recipe
-from hairkit.pipeline.run_record import RECORD, RunRecord, read_record
+from hairkit.pipeline.run_record import RECORD, RunRecord, hash_file, read_record
 from hairkit.pipeline.take_capture import take_capture
 from hairkit.pipeline.work_folder import WORK, LastRun
 from hairkit.rendering.head import Solid
@@ -57,7 +59,7 @@ class Layers:
         self.last = LastRun(None if results is None else results / WORK)
         record = _find_record(results)
         self._recipe = load_recipe("default") if record is None else record.as_recipe()
-        self.capture = _find_capture(record) if capture is None else capture
+        self.capture = _find_capture(record, results) if capture is None else capture
         """What the stage `capture` is asked for, such as the folder of the photos; None if
         unknown."""
 
@@ -219,11 +221,20 @@ def _find_record(results: Path | None) -> RunRecord | None:
         return None
 
 
-def _find_capture(record: RunRecord | None) -> str | None:
-    """Return the photos that a record names, None if they lay on this machine and are gone."""
+def _find_capture(record: RunRecord | None, results: Path | None) -> str | None:
+    """Return the photos that a record names, None if they lay on this machine and are gone.
+
+    Of a project that was copied they are those of the copy: around or beside the results.
+    """
     photos = None if record is None else record.photos
-    gone = photos is not None and Path(photos).is_absolute() and not Path(photos).exists()
-    return None if gone else photos
+    if record is None or photos is None or not Path(photos).is_absolute():
+        return photos
+    above = Path(results or ".").resolve().parent
+    for place, first in product((above, above / Path(photos).name), record.inputs[:1]):
+        copy = place / os.path.relpath(first.path, photos)
+        if copy.is_file() and hash_file(copy).sha256 == first.sha256:
+            return str(place)
+    return photos if Path(photos).exists() else None
 
 
 def _hsv_picture(found: OrientationMap) -> UInt8Array:

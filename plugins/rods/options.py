@@ -26,6 +26,9 @@ class Options(NodeOptions):
     cohesion: float = option(
         10.0, low=0.0, high=60.0, unit="1/s", doc="Rate at which neighbours' velocities even out."
     )
+    adhesion: float = option(
+        200.0, low=0.0, high=1000.0, unit="1/s^2", doc="Pull to where the hair beside has gone."
+    )
     pressure: float = option(
         2.0, low=0.0, high=50.0, unit="m/s^2", doc="Push out of cells twice as dense as captured."
     )

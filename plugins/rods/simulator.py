@@ -55,8 +55,11 @@ class RodSimulator(NodeSimulator):
     def _elastic(self, place: Float64Array) -> float:
         """Return the energy of bending, twist, the pull to the captured shape, and the support."""
         frames = self._engine.state.frames
-        raised = float((self._borne[..., None] * (place - self._nodes) @ self._rest_gravity).sum())
-        return elastic_energy(self.rods, place, frames, self._pull) - self._rest_energy + raised
+        moved = place - self._nodes
+        raised = float((self._borne[..., None] * moved @ self._rest_gravity).sum())
+        bound = -0.5 * float((self._bonds() * moved).sum())
+        energy = elastic_energy(self.rods, place, frames, self._pull) - self._rest_energy
+        return energy + raised + bound
 
     def _build(self, near: Float64Array) -> None:
         """Make the rods and their engine."""
@@ -69,6 +72,8 @@ class RodSimulator(NodeSimulator):
         contact = Contact(self._bodies, near, friction, options.depenetration, options.rounds)
         exact = options.backend == "reference"
         self._engine = Engine(rods, contact, np.float64 if exact else np.float32)
+        self._beside = self._now()[0][:, :, self._some]
+        self._beside_mass = self._engine.mass[:, :, self._some]
 
     def _stiffen(self, options: Options) -> Rods:
         """Return the rods, whose natural shape balances what weight nothing else bears."""
@@ -99,7 +104,7 @@ class RodSimulator(NodeSimulator):
             self._hair_grid.mix(now.position, now.velocity, engine.mass, change, rates)
         held = tuple(self._hands)
         system = self._system(round(seconds, 12), held)
-        force = self._support(steps, seconds * len(steps.turn), head)
+        force = self._support(steps, seconds * len(steps.turn), head) + self._bonds()
         if held:
             force += self.rods.mass[..., None] * self._drawn_by_hands(end)
         engine.run(system, steps, acting(self.rods, self._air(around, start), force))
@@ -117,3 +122,16 @@ class RodSimulator(NodeSimulator):
         share = np.maximum(pressed / max(rest @ rest, TINY), 0.0)
         force: Float64Array = -(self._borne * share[:, None])[..., None] * rest
         return force
+
+    def _bonds(self) -> Float64Array:
+        """Return the force (S, n, 3) that keeps hair beside what it was beside at rest, N, head
+        axes: springs to the mean way of what was within a cell of the hair grid.
+
+        Chang, Jin and Yu ("A practical model for hair mutual interactions", 2002) join guides so.
+        """
+        moved = self._now()[0][:, :, self._some] - self._beside
+        mean, nodes = moved.copy(), (self._beside_mass, np.eye(4))
+        self._hair_grid.mix(self._beside, mean, *nodes, (np.inf, 0.0, 1.0))
+        apart = (mean - moved).reshape(-1, *moved.shape[2:])[: len(self._nodes)]
+        pull = self._options.adhesion * self.rods.mass[..., None]
+        return np.asarray(pull * (self._share @ apart), np.float64)

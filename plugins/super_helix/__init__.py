@@ -10,7 +10,6 @@ point drags and pushes it. Nothing stretches.
 * `contact`: contact with the head and friction
 * `element_kernels`: compiled kinematics of one element
 * `elimination`: solve from tip to root in linear time
-* `hair_contact`: hair-hair contact on a grid
 * `linear_time_step`: an implicit step of all strands
 * `options`: settings
 * `rods`: elements, natural curvatures, masses

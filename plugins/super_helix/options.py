@@ -36,6 +36,9 @@ class Options:
     hair_push: float = option(
         4.0, low=0.0, high=100.0, doc="Push out of hair twice as dense as at rest.", unit="m/s2"
     )
+    adhesion: float = option(
+        200.0, low=0.0, high=1000.0, unit="1/s2", doc="Pull to where the hair beside has gone."
+    )
     contact: bool = option(True, doc="Whether the head keeps hair out.")
     substeps: int = option(2, low=1, high=64, doc="Steps in a sixtieth of a second.")
     iterations: int = option(

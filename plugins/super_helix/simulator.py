@@ -11,13 +11,13 @@ from hairkit.options import fill_options
 from hairkit.parallel import parallel_for
 from hairkit.simulation import Measures, Surroundings
 from hairkit.simulation.guide_simulator import FRAME, KERATIN, GuideSimulator
+from hairkit.simulation.hair_grid import SPACING, make_hair_grid
 from hairkit.simulation.held_guides import held_lengths
 from hairkit.simulation.rigid_motion import follow_head, interpolate_motion
-from hairkit.simulation.wind import air_velocity
+from hairkit.simulation.wind_shadow import wind_losses
 from hairkit.types.groom import Groom
 
 from .binding import bind_rods, carry_points
-from .hair_contact import Neighbours
 from .linear_time_step import place_points, step_strands
 from .options import Options
 from .rods import NODES, Rods
@@ -66,7 +66,9 @@ class SuperHelices(GuideSimulator):
         self._motion = Motion(q.copy(), q.copy(), rest, rest.copy(), still, still.copy())
         own = (rest - head[:3, 3]) @ head[:3, :3]
         self._gap = np.minimum(SKIN, self._bodies.at(own)[0])
-        self._neighbours = Neighbours(own, self._rods.masses)
+        hair, strand = make_hair_grid(own, self._rods.masses), SPACING * self._rods.density.mean()
+        self._shadow = wind_losses(hair, len(self.strands), strand, self._bodies), hair.origin
+        self._hair_grid, self._at_rest = hair, own
         self._rest_energy = self._potential(own, q, self._rest_gravity)
 
     def advance(self, seconds: float, surroundings: Surroundings) -> None:
@@ -114,6 +116,7 @@ class SuperHelices(GuideSimulator):
             ),
         )
         self._move_hands(around, GRAB_SPEED * seconds)
+        self._mix(seconds)
         loads = self._loads(around, air)
         parallel_for(step_strands, len(self._rods.roots), self._rods, self._motion, loads, step)
         self._head, self._torso, self._before = step.head, torso, seconds
@@ -121,26 +124,37 @@ class SuperHelices(GuideSimulator):
         self._time += seconds
 
     def _air(self, around: Surroundings) -> Float64Array:
-        """Return (E, NODES, 3) the air's velocity, gusts taken at the middle of each element."""
-        middle = np.ascontiguousarray(self._motion.points[:, NODES // 2])
-        air = air_velocity(middle, self._time, around.wind, around.turbulence)
-        return np.repeat(air[:, None], NODES, axis=1)
+        """Return (E, NODES, 3) the air's velocity, taken at the middle of each element."""
+        if not np.any(around.wind):
+            return np.zeros_like(self._motion.points)
+        now = (self._motion.points[:, NODES // 2] - self._head[:3, 3]) @ self._head[:3, :3]
+        air = self._air_at(
+            self._at_rest[:, NODES // 2, None], now, around, self._head, self._options.air_drag
+        )
+        return np.repeat(air, NODES, axis=1)
+
+    def _mix(self, seconds: float) -> None:
+        """Let hair take on the speed of that around it, and leave crowds; as in `rods`, draw it to
+        where what was beside it at rest has gone."""
+        options, motion, turn = self._options, self._motion, self._head[:3, :3]
+        own, mass = (motion.points - self._head[:3, 3]) @ turn, self._rods.masses
+        speed, moved = motion.velocity @ turn, own - self._at_rest
+        mixed, mean = speed.copy(), moved.copy()
+        rates = options.hair_friction, options.hair_push, seconds
+        for place, changed, how in (own, mixed, rates), (self._at_rest, mean, (np.inf, 0.0, 1.0)):
+            nodes = place.reshape(1, 1, -1, 3), changed.reshape(1, 1, -1, 3)
+            self._hair_grid.mix(*nodes, mass.reshape(1, 1, -1), np.eye(4), how)
+        change = (mixed - speed + options.adhesion * seconds * (mean - moved)) @ turn.T
+        motion.velocity[:] += change
+        motion.velocity_before[:] += change
 
     def _loads(self, around: Surroundings, air: Float64Array) -> Loads:
         motion, masses = self._motion, self._rods.masses
-        shape = masses.shape
-        drag = self._options.air_drag * masses
-        if self._options.hair_friction > 0 or self._options.hair_push > 0:
-            drag, air = self._neighbours.act(
-                motion.points,
-                motion.velocity,
-                drag,
-                air,
-                self._options.hair_friction,
-                self._options.hair_push,
-                self._head,
-            )
-        spring, anchor = np.zeros(shape), np.zeros_like(motion.points)
+        drag, spring, anchor = (
+            self._options.air_drag * masses,
+            np.zeros(masses.shape),
+            np.zeros_like(motion.points),
+        )
         drawn = self.points if around.grabs else np.empty((0, 3))
         for point, place in self._hands.items():
             element = self._binding.element[point]

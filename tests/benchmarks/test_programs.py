@@ -55,7 +55,7 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
     "held_out": ({"GUIDES": 60, "MEASURED": 5}, ["CAPTURES"]),
     "helices": ({"COUNT": 10}, []),
     "latency": (
-        {"GUIDES": 30},
+        {"GUIDES": 30, "WARM": 0},
         ["--photos", "CAPTURES/short/photos", "--only", "viewer", "--repeats", "1"],
     ),
     "looks": ({"GUIDES": 60}, ["CAPTURES", "-o", "CAPTURES/looks.jpg"]),
@@ -77,8 +77,8 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
     "robustness": ({}, ["--grooms", "2"]),
     "render": ({"GUIDES": 40}, ["--strands", "60", "--points", "8", "--size", "60x80"]),
     "scaling": (
-        {"PHOTOS": 8, "STEPS": {"guides": (20, 40), "file pixels": (240, 300)}},
-        ["CAPTURES/short", "--rounds", "1", "-o", "CAPTURES/growth.png"],
+        {"PHOTOS": 8, "STEPS": {"file pixels": (240, 300)}},
+        ["CAPTURES/short", "--only", "file pixels", "--rounds", "1", "-o", "CAPTURES/growth.png"],
     ),
     "segmentation": ({}, ["CAPTURES", "--plugin", "auto_matte"]),
     "skin": ({"HEIGHT": 120}, ["CAPTURES"]),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
@@ -14,12 +15,12 @@ NUMBA = {"njit", "jit", "vectorize", "guvectorize"}
 """Numba's decorators, of which those of the house are made."""
 
 
-def decorators(sources: list[str]) -> set[str]:
+def decorators(texts: list[str]) -> set[str]:
     """Return the names of decorators that compile: Numba's, and those that modules make of them.
 
     `stage = compiled_with(fastmath=True)`, or a function that calls one of them in its body.
     """
-    modules = [ast.parse(source) for source in sources]
+    modules = [ast.parse(text) for text in texts]
     used = {name for module in modules for one in ast.walk(module) for name in _decorated(one)}
     made = [pair for module in modules for pair in _made_of(module) if pair[0] in used]
     found = set(NUMBA)
@@ -107,16 +108,25 @@ def _last_name(node: ast.expr) -> str:
     return node.attr if isinstance(node, ast.Attribute) else getattr(node, "id", "")
 
 
+def sources(project: Path, *folders: str) -> dict[str, str]:
+    """Return the texts of all modules in folders by their paths."""
+    files = [file for folder in folders for file in (project / folder).rglob("*.py")]
+    return {file.relative_to(project).as_posix(): file.read_text() for file in sorted(files)}
+
+
+@cache
+def compilers_of(project: Path) -> set[str]:
+    """Return the `decorators` of the product."""
+    return decorators([*sources(project, "hairkit", "plugins").values()])
+
+
 @cache
 def all_kernels(project: Path) -> list[tuple[str, ast.FunctionDef]]:
     """Return name and tree of all kernels."""
-    files = [file for folder in ("hairkit", "plugins") for file in (project / folder).rglob("*.py")]
-    sources = {file.relative_to(project).as_posix(): file.read_text() for file in sorted(files)}
-    compilers = decorators([*sources.values()])
     return [
         (f"{name}:{kernel.name}", kernel)
-        for name, source in sources.items()
-        for kernel in kernels(source, compilers)
+        for name, source in sources(project, "hairkit", "plugins").items()
+        for kernel in kernels(source, compilers_of(project))
     ]
 
 
@@ -200,13 +210,15 @@ def names_in_python(node: ast.AST, compilers: set[str]) -> Iterator[str]:
 def test_what_is_compiled_for_kernels_is_called_by_kernels(project: Path) -> None:
     """Python names no function that has no entry for it: a call would end the process."""
     folders = ("hairkit", "plugins", "tests", "benchmarks", "studies", "examples")
-    files = [file for folder in folders for file in (project / folder).rglob("*.py")]
-    sources = [file.read_text() for file in files]
-    modules, compilers = [ast.parse(source) for source in sources], decorators(sources)
-    inside = {name for module in modules for name in inside_names(module)}
+    texts = sources(project, *folders)
+    marked = [ast.parse(text) for text in texts.values() if "inside=True" in text]
+    inside = {name for module in marked for name in inside_names(module)}
     assert len(inside) > 40
-    called = [inside & {*names_in_python(module, compilers)} for module in modules]
-    assert [(f, names) for f, names in zip(files, called, strict=True) if names] == []
+    words = re.compile(rf"\b({'|'.join(inside)})\b")
+    naming = {name: ast.parse(text) for name, text in texts.items() if words.search(text)}
+    compilers = compilers_of(project)
+    called = {name: inside & {*names_in_python(it, compilers)} for name, it in naming.items()}
+    assert {name: names for name, names in called.items() if names} == {}
 
 
 def test_faults_of_kernels_are_found() -> None:

@@ -52,23 +52,18 @@ def sample() -> Capture:
 
 
 def photos_alone() -> Capture:
-    """The sample's photos without names, masks, strokes and landmarks."""
-    return read_capture(sample_folder() / "photos", EDGE)
-
-
-def chosen() -> Capture:
-    """The sample with a moved head and curls."""
+    """The sample's photos without masks and landmarks, with a moved head and chosen curls."""
+    photos = read_capture(sample_folder() / "photos", EDGE)
     hair = ChosenHair(curl_radius_mm=4.0, curl_pitch_mm=20.0)
-    return replace(sample(), chosen=Chosen(hair, TURNED))
+    return replace(photos, chosen=Chosen(hair, TURNED))
 
 
 CASES: dict[str, tuple[Callable[[], Capture], str]] = {
     "sample": (sample, "default"),
     "photos alone": (photos_alone, "default"),
-    "chosen": (chosen, "default"),
     "thesis": (sample, "thesis"),
 }
-SKIN_FIRST = {"photos alone", "chosen"}
+SKIN_FIRST = {"photos alone"}
 """Cases whose skin is asked for first by the process of one thread, the others by one of more."""
 
 

@@ -250,6 +250,16 @@ def test_a_groom_without_strands_is_refused(
     assert "holds no strands" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("name", ["rods", "pbd", "super_helix"])
+def test_no_simulator_takes_a_groom_without_strands(
+    name: str, groom: Groom, manager: Manager
+) -> None:
+    """In the words of `hairkit simulate`, not by an error of an array without values."""
+    bald = groom.select(np.zeros(len(groom.strands), bool))
+    with pytest.raises(InputError, match="holds no strands, so there is nothing to simulate"):
+        manager.call("make_simulator", name, groom=bald)
+
+
 def test_frames_that_no_memory_holds_are_refused_at_once(groom: Groom, tmp_path: Path) -> None:
     """Before the first frame, with the size."""
     many = SimpleNamespace(strands=SimpleNamespace(points=np.zeros((10**7, 3))))

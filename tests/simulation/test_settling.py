@@ -45,3 +45,17 @@ def test_captured_hair_stays_for_five_seconds(style: StyleName) -> None:
     for _ in range(5 * RATE):
         simulator.advance(1 / RATE, Surroundings())
     assert np.linalg.norm(simulator.points - groom.strands.points, axis=1).max() < 0.002
+
+
+def test_hair_blown_over_the_shoulders_comes_back() -> None:
+    """Of hair that wind from behind brings to the front, none lies there a second after it.
+
+    Without the adhesion of `rods` tips stay up to 10 cm off; here each is within 25 mm.
+    """
+    groom = grow("wavy", default_head(), 150)
+    simulator, tips = SIMULATORS["rods"](groom), groom.strands.offsets[1:] - 1
+    for frame in range(1, 2 * RATE + 1):
+        wind = np.array([0.0, 0.0, 6.0 * (frame <= RATE)])
+        simulator.advance(1 / RATE, Surroundings(wind=wind, turbulence=0.4))
+    off = np.linalg.norm(simulator.points[tips] - groom.strands.points[tips], axis=1)
+    assert off.max() < 0.025

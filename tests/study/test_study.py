@@ -26,7 +26,7 @@ def camera(azimuth: float) -> Camera:
     return Camera.on_turn(azimuth, distance=0.8, focal=900.0, width=600, height=800)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture(scope="session")
 def study(manager: Manager) -> Iterator[Study]:
     """Four subjects, their pictures taken of other strands than those that are drawn."""
     subjects = []

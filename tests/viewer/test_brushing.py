@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +12,11 @@ import pytest
 from hairkit import Brush, Edit, Edits, Groom
 from hairkit.errors import InputError, OptionError
 from hairkit.grooming.brushes import BRUSHES, edit_groom
+from hairkit.manager import Manager
+from hairkit.pipeline.recipe import load_recipe
+from hairkit.pipeline.run_record import describe_run, hash_file
 from hairkit.storage import to_arrays, write_npz
+from hairkit.testing import turn_capture
 from hairkit.types.edits import read_edits
 from hairkit.viewer.actions.actions import perform
 from hairkit.viewer.brushing import NAMES
@@ -168,3 +174,28 @@ def test_strokes_lie_over_the_groom_of_the_photos(session: Session, tmp_path: Pa
     perform(other, "undo")
     shown: Groom = other.opened.groom
     np.testing.assert_array_equal(shown.strands.points, session.opened.groom.strands.points)
+
+
+@pytest.mark.parametrize("place", [".", "photos"])
+def test_strokes_on_a_copy_leave_the_original(
+    place: str, session: Session, tmp_path: Path, manager: Manager
+) -> None:
+    """Photos lie around or beside the results: those of the copy are found, by their content."""
+    photos = tmp_path / "one" / place
+    photos.mkdir(parents=True)
+    photo = photos / "0_front.png"
+    photo.write_bytes(b"a photo")
+    results = tmp_path / "one" / "out"
+    (results / "work").mkdir(parents=True)
+    session.opened.groom.save(results / "groom.npz")
+    recipe = load_recipe("default")
+    capture = replace(turn_capture(), source=photos)
+    record = describe_run(capture, None, recipe, manager, 60, 0)
+    replace(record, inputs=(hash_file(photo),)).write(results / "run.json")
+    shutil.copytree(tmp_path / "one", tmp_path / "two")
+    copy = Session(session.manager, tmp_path / "two" / "out", size=(160, 120), hairs=600)
+    draw(copy, "comb", *over_the_top(copy))
+    assert [str(path.parent) for path in tmp_path.rglob("edits.json")] == [copy.layers.capture]
+    assert copy.layers.capture == str(tmp_path / "two" / place)
+    photo.write_bytes(b"another photo")
+    assert Session(session.manager, results, size=(160, 120)).layers.capture == str(photos)

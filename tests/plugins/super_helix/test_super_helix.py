@@ -7,7 +7,6 @@ import dataclasses
 import numpy as np
 import pytest
 from hairkit_plugins.super_helix import Options
-from hairkit_plugins.super_helix.hair_contact import Neighbours
 from hairkit_plugins.super_helix.simulator import SuperHelices
 
 from hairkit import parallel
@@ -165,31 +164,34 @@ def test_frames_do_not_depend_on_threads(monkeypatch: pytest.MonkeyPatch) -> Non
     np.testing.assert_array_equal(*results)
 
 
-def test_hair_around_drags_to_its_own_speed(rng: np.random.Generator) -> None:
-    """Hair that moves as one is not dragged; mixed hair is drawn to the mean of its place."""
-    points, masses = rng.uniform(0, 0.05, (2000, 3, 3)), np.ones((2000, 3))
-    around = Neighbours(points, masses)
-    none, still = np.zeros((2000, 3)), np.zeros((2000, 3, 3))
-    same = np.broadcast_to([1.0, 2.0, 3.0], still.shape)
-    rate, pulled = around.act(points, same.copy(), none, still, 5.0, 0.0, np.eye(4))
-    np.testing.assert_allclose(pulled, same, rtol=1e-12)
-    assert 0 < rate.min() <= rate.max() <= 5.0
-    mixed = np.where(np.arange(2000)[:, None, None] % 2, 1.0, -1.0) * np.ones((1, 3, 3))
-    _, pulled = around.act(points, mixed, none, still, 5.0, 0.0, np.eye(4))
-    assert np.abs(pulled).mean() < 0.2
+def test_hair_takes_on_the_speed_of_hair_around(rng: np.random.Generator) -> None:
+    """Hair that moves as one is left alone; speeds that differ come nearer, momentum stays."""
+    options = Options(elements=4, hair_friction=60.0, hair_push=0.0)
+    simulator = SuperHelices(bristle_groom(), options)
+    motion, masses = simulator._motion, simulator._rods.masses
+    motion.velocity[:] = [0.1, 0.2, -0.3]
+    simulator._mix(0.1)
+    np.testing.assert_allclose(motion.velocity - [0.1, 0.2, -0.3], 0.0, atol=1e-12)
+    before = rng.normal(size=motion.velocity.shape)
+    motion.velocity[:] = before
+    simulator._mix(0.1)
+    assert motion.velocity.std() < 0.7 * before.std()
+    momentum = [(masses[..., None] * v).sum(axis=(0, 1)) for v in (before, motion.velocity)]
+    np.testing.assert_allclose(*momentum, atol=0.01 * masses.sum())
 
 
-def test_crowded_hair_is_pushed_apart(rng: np.random.Generator) -> None:
-    """Hair squeezed from its rest is accelerated outwards, hair at rest is not."""
-    points, masses = rng.uniform(-0.05, 0.05, (2000, 3, 3)), np.ones((2000, 3))
-    around = Neighbours(points, masses)
-    zero, still = np.full((2000, 3), 1e-9), np.zeros((2000, 3, 3))
-    rate, pulled = around.act(points, still, zero, still, 0.0, 5.0, np.eye(4))
-    np.testing.assert_allclose(rate[..., None] * pulled, 0, rtol=0, atol=1e-12)
-    tight = 0.6 * points
-    rate, pulled = around.act(tight, still, zero, still, 0.0, 5.0, np.eye(4))
-    outward = (rate[..., None] * pulled * tight).sum(-1)[np.linalg.norm(tight, axis=-1) > 0.025]
-    assert outward.mean() > 0
+def test_hair_is_drawn_to_where_that_beside_has_gone(rng: np.random.Generator) -> None:
+    """What has moved alike, with the head or not, feels nothing; what has not comes nearer."""
+    simulator = SuperHelices(bristle_groom(), FEW)
+    motion, rest = simulator._motion, simulator._motion.points.copy()
+    motion.points[:] = rest + np.array([0.01, -0.02, 0.005])
+    simulator._mix(0.1)
+    np.testing.assert_allclose(motion.velocity, 0.0, atol=1e-12)
+    apart = rng.normal(0, 0.005, rest.shape)
+    motion.points[:] = rest + apart
+    simulator._mix(0.1)
+    assert (motion.velocity * apart).sum() < -0.3 * 200 * 0.1 * (apart**2).sum()
+    np.testing.assert_array_equal(motion.velocity, motion.velocity_before)
 
 
 def test_retuning_keeps_positions() -> None:
