@@ -110,10 +110,7 @@ def orient(view: View, mask: Mask, options: Any) -> OrientationMap | None:
 
 @hookspec(firstresult=True)
 def build_hull(
-    scene: Scene,
-    masks: tuple[Mask, ...],
-    orientations: tuple[OrientationMap, ...],
-    options: Any,
+    scene: Scene, masks: tuple[Mask, ...], orientations: tuple[OrientationMap, ...], options: Any
 ) -> Hull | None:
     """Carve the volume that hair fills from the masks of all views."""
 

@@ -17,12 +17,7 @@ import numpy as np
 
 from hairkit.arrays import Int64Array
 from hairkit.errors import InputError
-from hairkit.grooming.adopt_strands import (
-    ImportOptions,
-    adopt,
-    mean_look,
-    plain_widths,
-)
+from hairkit.grooming.adopt_strands import ImportOptions, adopt, mean_look, plain_widths
 from hairkit.grooming.curve_sets import CurveSet, strands_of
 from hairkit.grooming.prepare_export import ExportOptions, prepare_export
 from hairkit.hookspecs import hookimpl

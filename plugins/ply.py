@@ -19,11 +19,7 @@ import numpy.typing as npt
 from hairkit.arrays import Float32Array
 from hairkit.colour import linear_from_srgb, srgb_from_linear
 from hairkit.errors import InputError
-from hairkit.grooming.adopt_strands import (
-    ImportOptions,
-    adopt,
-    plain_widths,
-)
+from hairkit.grooming.adopt_strands import ImportOptions, adopt, plain_widths
 from hairkit.grooming.curve_sets import CurveSet, strands_of
 from hairkit.grooming.prepare_export import ExportOptions, prepare_export
 from hairkit.hookspecs import hookimpl

@@ -145,5 +145,4 @@ def _to_edge(field: Float32Array, points: Float64Array) -> Float64Array:
     column, row = points.astype(int).T
     gradient = np.stack([column_slope[row, column], row_slope[row, column]], axis=1)
     length = np.maximum((gradient**2).sum(1, keepdims=True), LEAST_SLOPE)
-    moved: Float64Array = points - field[row, column][:, None] * gradient / length
-    return moved
+    return np.asarray(points - field[row, column][:, None] * gradient / length)

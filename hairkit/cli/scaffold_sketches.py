@@ -245,9 +245,7 @@ return [Finding.of("wig-length", longest <= LONGEST, said)]""",
         before="\nLONGEST = 0.8\n",
     ),
     "stage_finished": Sketch(
-        "Tells when stages end.",
-        "",
-        'print(f"{stage} took {seconds:.2f} s", file=sys.stderr)',
+        "Tells when stages end.", "", 'print(f"{stage} took {seconds:.2f} s", file=sys.stderr)'
     ),
     "groom_ready": Sketch(
         "Tells how much hair a run has made.",

@@ -72,11 +72,7 @@ def _passed(strands: Strands, hull: Hull) -> BoolArray:
 
 
 def _missing(
-    hair: BoolArray,
-    surface: Float32Array,
-    camera: Camera,
-    covering: Float64Array,
-    reach: float,
+    hair: BoolArray, surface: Float32Array, camera: Camera, covering: Float64Array, reach: float
 ) -> BoolArray:
     """Return the pixels (H, W) well inside the hair within `reach` of no covering place (N, 3)."""
     covered = np.zeros(hair.shape, np.uint8)

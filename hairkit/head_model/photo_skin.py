@@ -253,10 +253,7 @@ def _usable(camera: Camera, mask: Mask, photo: UInt8Array) -> Float32Array:
 
 
 def _blend(
-    views: Sequence[_Seen],
-    photos: Sequence[UInt8Array],
-    gains: Float64Array,
-    features: BoolArray,
+    views: Sequence[_Seen], photos: Sequence[UInt8Array], gains: Float64Array, features: BoolArray
 ) -> tuple[Float32Array, Float32Array]:
     """Return (S, S, 3) the blended colours and (C, C) the weight of all views together.
 

@@ -29,11 +29,7 @@ _NOTHING, _HAIR, _SOLID = (0.0, 0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 1.0), (0.0, 1.0,
 
 
 def draw_layers(
-    strands: Strands,
-    solids: Solids,
-    camera: Camera,
-    *,
-    width: float | Float32Array = 5e-4,
+    strands: Strands, solids: Solids, camera: Camera, *, width: float | Float32Array = 5e-4
 ) -> tuple[Float32Array, Float32Array]:
     """Return the coverage (H, W) of each pixel, 0 to 1, by visible hair and by bare meshes.
 
@@ -67,11 +63,7 @@ class Measurements:
 
 
 def draw_measurements(
-    strands: Strands,
-    solids: Solids,
-    camera: Camera,
-    *,
-    width: float | Float32Array = 2e-4,
+    strands: Strands, solids: Solids, camera: Camera, *, width: float | Float32Array = 2e-4
 ) -> Measurements:
     """Return direction and depth of the visible strand at each pixel, in one pass."""
     meshes = _meshes(solids)
@@ -92,11 +84,7 @@ def draw_measurements(
 
 
 def draw_depth(
-    strands: Strands,
-    head: Solids,
-    camera: Camera,
-    *,
-    width: float | Float32Array = 2e-4,
+    strands: Strands, head: Solids, camera: Camera, *, width: float | Float32Array = 2e-4
 ) -> Float32Array:
     """Return the axial depth (H, W) of the visible strand at each pixel, metres, else infinity."""
     return draw_measurements(strands, head, camera, width=width).depth

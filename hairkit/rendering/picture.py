@@ -212,13 +212,7 @@ def _shoot(
         if solids:
             draw_skin(gl, solids, maps, camera, depth, HEAD_PUSH, skin, uniforms)
         draw_ribbons(
-            gl,
-            buffers,
-            gl.program("hair"),
-            camera,
-            depth,
-            shader="hair_ribbon_shade",
-            **uniforms,
+            gl, buffers, gl.program("hair"), camera, depth, shader="hair_ribbon_shade", **uniforms
         )
         return np.asarray(picture.read(), np.uint8)
 

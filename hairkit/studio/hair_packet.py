@@ -126,10 +126,7 @@ def _mesh(name: str, solid: Solid) -> dict[str, npt.NDArray[Any]]:
 
 def _look(hair: Strands, material: HairMaterial) -> dict[str, Any]:
     """Return width in metres and taper of the hair as uniforms of its shader."""
-    return {
-        "u_width": float(display_width(replace(hair, widths=None), material)),
-        "u_taper": TAPER,
-    }
+    return {"u_width": float(display_width(replace(hair, widths=None), material)), "u_taper": TAPER}
 
 
 def _on_eyes(head: Head) -> npt.NDArray[np.float32]:

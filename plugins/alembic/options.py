@@ -24,8 +24,7 @@ class Options(SpaceOptions, ImportOptions, AnimationOptions, ExportOptions):
         doc="Strands of more points are resampled to so many; Unreal reads up to 255.",
     )
     mark_guides: bool = option(
-        False,
-        doc="Mark guides in a file of guides alone, which Unreal then does not draw.",
+        False, doc="Mark guides in a file of guides alone, which Unreal then does not draw."
     )
     attributes: bool = option(
         True,

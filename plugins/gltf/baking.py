@@ -37,13 +37,7 @@ class Baked:
     """(T, M) of the shapes, 0 to 1."""
 
 
-def bake(
-    cache: PointCache,
-    rest: Float32Array,
-    step: int,
-    morphs: int,
-    deform: bool,
-) -> Baked:
+def bake(cache: PointCache, rest: Float32Array, step: int, morphs: int, deform: bool) -> Baked:
     """Return the motion in at most `morphs` shapes; a warning states the error.
 
     Parameters

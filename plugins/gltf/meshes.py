@@ -83,8 +83,7 @@ class Meshes:
         """Return colours (V, 3) by which the skin is multiplied: the roots' on the scalp."""
         scalp = self.groom.head.scalp[:, None]
         tint = scalp * (_SCALP_SHADE * self.groom.material.root_colour / SKIN_COLOUR)
-        shade: Float64Array = np.clip(tint + 1 - scalp, 0, 1)
-        return shade
+        return np.asarray(np.clip(tint + 1 - scalp, 0, 1))
 
     def hair(self, mesh: HairMesh, material: int, level: int) -> int:
         """Add strips and return their mesh."""
@@ -254,11 +253,7 @@ def skin_material(document: Document, maps: SkinMaps) -> int:
     index = {_INDEX: {"ior": LOOK.ior}}
     document.json.setdefault("extensionsUsed", []).append(_INDEX)
     return document.add(
-        "materials",
-        name="head",
-        pbrMetallicRoughness=look,
-        normalTexture=normal,
-        extensions=index,
+        "materials", name="head", pbrMetallicRoughness=look, normalTexture=normal, extensions=index
     )
 
 

@@ -158,8 +158,7 @@ class _Custom:
         count = self.file.item("accessors", attributes["POSITION"])["count"]
         if values.shape != (count, 1) or not np.isfinite(values).all():
             raise ValueError(f"{name} is not a finite number for each point")
-        column: Float64Array = values[self.order, 0]
-        return column
+        return np.asarray(values[self.order, 0])
 
     def of_strands(self, name: str) -> Int64Array | None:
         """Return (S,) whole numbers: of the attribute, or one for all strands in the extras."""
@@ -203,8 +202,7 @@ def _segments(file: GlbFile, primitive: dict[str, Any], vertices: int) -> Int64A
     pairs = np.stack([index[:-1], index[1:]], axis=1)
     if primitive["mode"] == _LOOP and len(index) > 2:
         pairs = np.concatenate([pairs, [[index[-1], index[0]]]])
-    kept: Int64Array = pairs[(pairs != restart).all(axis=1)]
-    return kept
+    return np.asarray(pairs[(pairs != restart).all(axis=1)])
 
 
 def _weld(segments: Int64Array, points: npt.NDArray[Any]) -> Int64Array:

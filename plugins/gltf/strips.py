@@ -95,12 +95,7 @@ def _denser(
 
 
 def _level(
-    groom: Groom,
-    shapes: Float32Array,
-    count: int,
-    points: int,
-    options: Options,
-    wider: int,
+    groom: Groom, shapes: Float32Array, count: int, points: int, options: Options, wider: int
 ) -> HairMesh:
     strands = groom.strands
     locks = gather_locks(strands, count, points, mean=options.hair == "cards", seed=options.seed)
@@ -122,12 +117,7 @@ def _level(
 
 
 def _widths(
-    groom: Groom,
-    locks: Locks,
-    lines: Float32Array,
-    out: Float32Array,
-    options: Options,
-    wider: int,
+    groom: Groom, locks: Locks, lines: Float32Array, out: Float32Array, options: Options, wider: int
 ) -> Float32Array:
     """Return (N, K) widths in metres: a little narrower at the root, narrow at the tip."""
     count, points = lines.shape[:2]

@@ -130,10 +130,7 @@ def order_by_content(views: Sequence[View]) -> Int64Array:
 
 
 def _find(
-    views: Sequence[View],
-    outlines: Sequence[Outline | None],
-    sequence: Int64Array,
-    follow: float,
+    views: Sequence[View], outlines: Sequence[Outline | None], sequence: Int64Array, follow: float
 ) -> list[Found]:
     """Return from where the photos were taken: as their names say, if no face contradicts them.
 

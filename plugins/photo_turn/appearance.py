@@ -86,8 +86,7 @@ def _distance(variants: Float64Array, edges: Float64Array) -> Float64Array:
     """Return distances (V,) of outlines, each at all its scales, from one."""
     off = variants - edges
     off = off - np.median(off, axis=(2, 3), keepdims=True)
-    nearest: Float64Array = np.abs(off).mean(axis=(2, 3)).min(axis=1)
-    return nearest
+    return np.asarray(np.abs(off).mean(axis=(2, 3)).min(axis=1))
 
 
 def compare_heads(photos: Sequence[UInt8Array], outlines: Sequence[Outline]) -> Float64Array:

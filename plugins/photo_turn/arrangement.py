@@ -169,8 +169,7 @@ class Placed:
 
 def wrap(angle_deg: Float64Array) -> Float64Array:
     """Return angles in (-180, 180]."""
-    wrapped: Float64Array = 180.0 - (180.0 - np.asarray(angle_deg, np.float64)) % 360.0
-    return wrapped
+    return np.asarray(180.0 - (180.0 - np.asarray(angle_deg, np.float64)) % 360.0)
 
 
 def measure_cost(

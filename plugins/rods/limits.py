@@ -24,8 +24,7 @@ def max_stiffness(points: Float64Array, step: float) -> Float64Array:
     """
     length = np.linalg.norm(np.diff(points, axis=1), axis=-1).min(axis=1)
     curl = np.maximum(largest_turn(points), 1e-3)
-    result: Float64Array = np.minimum(FIRMEST, FOLLOWED / curl**3) * length**4 / step**2
-    return result
+    return np.asarray(np.minimum(FIRMEST, FOLLOWED / curl**3) * length**4 / step**2)
 
 
 def overhang(points: Float64Array) -> Float64Array:
@@ -39,5 +38,4 @@ def overhang(points: Float64Array) -> Float64Array:
     beyond = np.cumsum(length[:, ::-1], axis=1)[:, ::-1]
     moment = np.cumsum((length[..., None] * level)[:, ::-1], axis=1)[:, ::-1]
     moment = moment - beyond[..., None] * points[:, :-1, [0, 2]]
-    result: Float64Array = (np.linalg.norm(moment, axis=-1) * beyond).max(axis=1)
-    return result
+    return np.asarray((np.linalg.norm(moment, axis=-1) * beyond).max(axis=1))

@@ -120,8 +120,7 @@ class RodSimulator(NodeSimulator):
         after = self._nodes[:, 0] @ drift[:, :3].T + drift[:, 3]
         pressed = (steps.air[-1, :, 3] - (after - before) / seconds) @ rest
         share = np.maximum(pressed / max(rest @ rest, TINY), 0.0)
-        force: Float64Array = -(self._borne * share[:, None])[..., None] * rest
-        return force
+        return np.asarray(-(self._borne * share[:, None])[..., None] * rest)
 
     def _bonds(self) -> Float64Array:
         """Return the force (S, n, 3) that keeps hair beside what it was beside at rest, N, head

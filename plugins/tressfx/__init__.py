@@ -18,11 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from hairkit.arrays import Float32Array
-from hairkit.grooming.adopt_strands import (
-    ImportOptions,
-    adopt,
-    plain_widths,
-)
+from hairkit.grooming.adopt_strands import ImportOptions, adopt, plain_widths
 from hairkit.grooming.curve_sets import CurveSet, strands_of
 from hairkit.grooming.prepare_export import ExportOptions, prepare_export
 from hairkit.hookspecs import hookimpl

@@ -100,5 +100,4 @@ def _place(
         raise FormatError(f"{source}: scale is not one number above 0, or translation not three")
     if settings.get("rotation", np.zeros(3)).any():
         _log.warning("%s: its rotation is not applied", source)
-    moved: Float64Array = points * scale[0] + move
-    return moved
+    return np.asarray(points * scale[0] + move)

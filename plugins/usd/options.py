@@ -21,8 +21,7 @@ class Options(SpaceOptions, ImportOptions, AnimationOptions, ExportOptions):
     head_mesh: bool = option(True, doc="Write the head's mesh.")
     bust: bool = option(True, doc="Write a clothed bust under a head that ends at the neck.")
     mark_guides: bool = option(
-        False,
-        doc="Mark guides in a file of guides alone, which Unreal then does not draw.",
+        False, doc="Mark guides in a file of guides alone, which Unreal then does not draw."
     )
     attributes: bool = option(
         True,

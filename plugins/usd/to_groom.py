@@ -13,14 +13,7 @@ import numpy as np
 from hairkit.arrays import Int64Array
 from hairkit.errors import FormatError, InputError
 from hairkit.grooming.adopt_strands import ImportOptions, adopt
-from hairkit.grooming.curve_sets import (
-    VERTEX,
-    CurveSet,
-    Spread,
-    join_sets,
-    on_curve,
-    strands_of,
-)
+from hairkit.grooming.curve_sets import VERTEX, CurveSet, Spread, join_sets, on_curve, strands_of
 from hairkit.io.coordinate_space import FileSpace
 from hairkit.io.glb_file import readable
 from hairkit.io.plain_settings import made, ties_of

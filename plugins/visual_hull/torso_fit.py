@@ -175,8 +175,7 @@ def _derivatives(usual: Torso, numbers: Float64Array, views: Sequence[_View]) ->
     """Return (N, 9) how the misfits change with each of the numbers (9,), all found at once."""
     steps = np.concatenate([np.zeros((1, len(numbers))), DIFFERENCE * np.eye(len(numbers))])
     found = _misfits(usual, numbers + steps, views)
-    change: Float64Array = (found[1:] - found[0]).T / DIFFERENCE
-    return change
+    return np.asarray((found[1:] - found[0]).T / DIFFERENCE)
 
 
 def _misfits(usual: Torso, numbers: Float64Array, views: Sequence[_View]) -> Float64Array:

@@ -136,7 +136,9 @@ def _captured(truth: Path, rng: np.random.Generator) -> Shape:
     return Shape(
         truth.parent.name,
         paths.astype(np.float32),
-        _scattered(np.asarray(mesh.vertices, np.float32), mesh.faces, SKIN, rng),
+        _scattered(
+            np.asarray(mesh.vertices, np.float32), np.asarray(mesh.faces, np.int32), SKIN, rng
+        ),
         moved.apply(_scattered(bust.vertices, bust.faces, CLOTHES, rng)).astype(np.float32),
         moved.apply(head_middle(head)[None])[0].astype(np.float32),
     )

@@ -130,7 +130,6 @@ def train(
     return mean
 
 
-@torch.no_grad()
 def report(name: str, weights: dict[str, Tensor], features: Tensor, depths: Tensor) -> None:
     """Print the errors of the depths, whole photos and photos that are cut off."""
     if not len(features):
@@ -140,7 +139,8 @@ def report(name: str, weights: dict[str, Tensor], features: Tensor, depths: Tens
     for first in range(0, len(features), BATCH):
         x, y = features[first : first + BATCH].float(), depths[first : first + BATCH].float()
         x, y = vary(x, y, random)
-        found.append(errors(network(weights, x), y)[0])
+        with torch.no_grad():
+            found.append(errors(network(weights, x), y)[0])
     gaps = torch.cat(found)
     print(
         f"{name}: {len(features)} views, mean error front, end of the first layer, back, mm:"
@@ -201,7 +201,7 @@ def main(words: Sequence[str] | None = None) -> None:
     fit([], "")
     if args.folds:
         fit(range(1, len(names) + 1), "-synth")
-        kinds = {}
+        kinds: dict[str, list[int]] = {}
         for k, name in enumerate(names, 1):
             kinds.setdefault(name.split("_")[0], []).append(k)
         for name, left_out in kinds.items():

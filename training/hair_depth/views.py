@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 
 import torch
 import torch.nn.functional as F  # noqa: N812 the name of this module in PyTorch's own documents
 from torch import Tensor
 
 from hairkit.field.hair_depth import ABOVE, CHANNELS, GRID, HEAD_SCALE, LAYERS, WINDOW
+
+from .grooms import Shape
 
 BETWEEN = 3
 """Points drawn for each of a strand."""
@@ -24,7 +27,7 @@ CELLS = GRID * GRID
 class Shapes:
     """Grooms on the device."""
 
-    def __init__(self, shapes: list, device: str) -> None:
+    def __init__(self, shapes: Sequence[Shape], device: str) -> None:
         def stacked(name: str) -> Tensor:
             return torch.stack([torch.from_numpy(getattr(s, name)) for s in shapes]).to(device)
 
@@ -87,7 +90,7 @@ class _View:
         return cell, local[..., 2], local
 
 
-def _deformed(hair: Tensor, uniform) -> Tensor:
+def _deformed(hair: Tensor, uniform: Callable[..., Tensor]) -> Tensor:
     """Return hair (B, N, 3), its curtains moved back or forward, and wider or narrower."""
     x, y, z = hair.unbind(-1)
     low = torch.sigmoid((uniform(-0.08, 0.0, 1) - y) / 0.02)
