@@ -1,4 +1,4 @@
-"""How far away the hair in one photo is: a network's guess, learnt from grooms alone.
+"""How far away the hair in one photo is: a network's guess, learnt from grooms.
 
 One photo tells nothing of its rays' third dimension but by what hair is like. A U-Net sees, in an
 upright view of the head, hair, skin and clothes, the strands' directions and the depth of the

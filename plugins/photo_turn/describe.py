@@ -97,13 +97,11 @@ def summarise(
     sizes = np.diff(around, append=around[0] + 360.0)
     one_way = abs(np.count_nonzero(steps > 0) - np.count_nonzero(steps < 0)) > len(steps) / 2
     side = f"turn to the subject's {'left' if np.median(steps) > 0 else 'right'}"
-    parts = [
-        f"{side if one_way else 'turn'}, steps {sizes.min():.0f} to {sizes.max():.0f} degrees",
-        *_tell_photos(views, found, names),
-    ]
+    turn = f"{side if one_way else 'turn'}, steps {sizes.min():.0f} to {sizes.max():.0f} degrees"
+    parts = [turn if len(views) > 1 else "one photo", *_tell_photos(views, found, names)]
     if found.note:
         parts.append(found.note)
-    if not one_way:
+    if not one_way and len(views) > 1:
         parts.append("the photos are not in the order of their names")
     parts += [f"{views[j].photo_name} equals {views[i].photo_name}" for i, j in twins[:MOST_TOLD]]
     if len(twins) > MOST_TOLD:

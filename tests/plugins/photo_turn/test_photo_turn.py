@@ -294,7 +294,9 @@ def test_one_photo_without_face_needs_a_name() -> None:
     """A lone photo from behind is refused in one line, and taken where its name tells the view."""
     with pytest.raises(InputError, match="no face is found"):
         find(ring([180.0]))
-    assert find(named(ring([180.0]), [180.0])).azimuth_deg.tolist() == [180.0]
+    found = find(named(ring([180.0]), [180.0]))
+    assert found.azimuth_deg.tolist() == [180.0]
+    assert found.summary == "one photo"
 
 
 def test_photos_before_one_wall_are_no_copies() -> None:
