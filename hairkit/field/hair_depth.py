@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array
 from hairkit.cameras.depth_raster import head_depth
-from hairkit.imaging.hair_network import Weights, read_weights, run_network
+from hairkit.imaging.unet import Weights, read_weights, run_network
 from hairkit.types.camera import Camera
 from hairkit.types.head import Head
 from hairkit.types.mask import Mask

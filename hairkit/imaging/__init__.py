@@ -16,5 +16,6 @@ measured over all views.
 * `seeded_segmentation`: hair, person and background from seeds
 * `relief`: bump and normal maps, pictures of differences
 * `skin_colour`: blood and melanin in an albedo
+* `unet`: a small U-Net in NumPy
 * `waves`: radius and pitch of waves in the orientation maps
 """

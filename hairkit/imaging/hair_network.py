@@ -1,7 +1,6 @@
 """A small convolutional network that tells hair from the rest of a person and the background.
 
-A U-Net (Ronneberger, Fischer and Brox 2015) on the features of `hairkit.imaging.hair_features`,
-with a stride of two at its entry and a sub-pixel convolution at its end (Shi et al. 2016). It was
+A U-Net (`hairkit.imaging.unet`) on the features of `hairkit.imaging.hair_features`. It was
 trained on 4,800 and then 4,167 pictures made of renders alone, of path-traced heads and of
 `hairkit synth`, whose hair, skin, clothes and surroundings were recoloured and warped at random,
 with painted bodies, plaits, beards, glasses and bald crowns; `training/hair_network` in the
@@ -11,7 +10,6 @@ repository does that.
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Sequence
 from functools import cache
 from importlib import resources
@@ -23,12 +21,9 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array, UInt8Array
 from hairkit.imaging.hair_features import hair_features
-from hairkit.storage import read_npz
+from hairkit.imaging.unet import Weights, read_weights, run_network
 from hairkit.types.capture import View
 from hairkit.types.person import Person
-
-Weights = dict[str, Float32Array]
-"""Kernels (C out, C in, k, k) and biases (C out,) of every layer: `first.weight`, `first.bias`."""
 
 MIRRORED = (5, 9)
 """Features that change their sign in a mirrored photo: the strands' slope and the coordinate across
@@ -167,57 +162,6 @@ def hair_probability(
     ]
     odds = mean * (np.stack(cells, axis=-1) / np.float32(255)).clip(LEAST_ODDS, None)
     return np.asarray(odds / odds.sum(axis=-1, keepdims=True), np.float32)
-
-
-def run_network(values: Float32Array, weights: Weights) -> Float32Array:
-    """Return the scores (3, GRID, GRID) of the three classes."""
-    levels = sum(name.startswith("up") for name in weights) // 2
-    x = _relu(_convolve(_relu(_convolve(values, weights, "entry", stride=2)), weights, "first"))
-    kept = [x]
-    for level in range(levels):
-        x = _relu(_convolve(_halve(x), weights, f"down{level}a"))
-        x = _relu(_convolve(x, weights, f"down{level}b"))
-        kept.append(x)
-    for level in reversed(range(levels)):
-        doubled = x.repeat(2, axis=1).repeat(2, axis=2)
-        x = _relu(_convolve(np.concatenate([doubled, kept[level]]), weights, f"up{level}"))
-    scores = _convolve(x, weights, "exit")
-    classes, rows, columns = len(scores) // 4, *scores.shape[1:]
-    blocks = scores.reshape(classes, 2, 2, rows, columns).transpose(0, 3, 1, 4, 2)
-    return blocks.reshape(classes, 2 * rows, 2 * columns)
-
-
-def read_weights(path: str | os.PathLike[str]) -> Weights:
-    """Return the weights in a file of `training/hair_network`."""
-    return {name: array.astype(np.float32) for name, array in read_npz(path).items()}
-
-
-def _convolve(x: Float32Array, weights: Weights, name: str, stride: int = 1) -> Float32Array:
-    """Return the correlation of x (C, h, w), padded with zeros, with the kernels of a layer."""
-    kernels, bias = weights[f"{name}.weight"], weights[f"{name}.bias"]
-    edge = kernels.shape[-1]
-    height, width = x.shape[1:]
-    padded = np.pad(x, ((0, 0), (edge // 2,) * 2, (edge // 2,) * 2))
-    patches = np.concatenate(
-        [
-            padded[:, row : row + height : stride, column : column + width : stride]
-            for row in range(edge)
-            for column in range(edge)
-        ]
-    )
-    flat = kernels.transpose(0, 2, 3, 1).reshape(len(kernels), -1)
-    result = flat @ patches.reshape(len(patches), -1) + bias[:, None]
-    return np.asarray(result.reshape(len(kernels), *patches.shape[1:]), np.float32)
-
-
-def _halve(x: Float32Array) -> Float32Array:
-    """Return the largest of every 2 x 2 values of x (C, h, w)."""
-    rows = np.maximum(x[:, ::2], x[:, 1::2])
-    return np.maximum(rows[:, :, ::2], rows[:, :, 1::2])
-
-
-def _relu(x: Float32Array) -> Float32Array:
-    return np.maximum(x, 0)
 
 
 def _softmax(scores: Float32Array) -> Float32Array:

@@ -250,10 +250,9 @@ class Findings:
 
     @result_of(HULL)
     def hull(self) -> Given[Hull]:
-        """The volume that hair fills."""
-        return self.run.once(
-            HULL, scene=self.scene, masks=self.masks, orientations=self.orientations
-        )
+        """The volume that hair fills. A turn bounds it by its outlines, without directions."""
+        known = self.orientations if self.scene.value.one_sided else Given.of(())
+        return self.run.once(HULL, scene=self.scene, masks=self.masks, orientations=known)
 
     @result_of(DISTANCE)
     def scalp_distance(self) -> Given[ScalpDistance]:

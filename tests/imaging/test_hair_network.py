@@ -72,17 +72,6 @@ def test_cells_off_the_photo_are_empty() -> None:
     assert (features.values[8, :rows] == 1).all()
 
 
-def test_a_convolution_equals_its_definition() -> None:
-    """One output of a layer is the sum over its window, written out."""
-    x = np.random.default_rng(2).normal(size=(14, 8, 8)).astype(np.float32)
-    weights = hair_network._shipped_weights()
-    kernels, bias = (weights[f"entry.{part}"] for part in ("weight", "bias"))
-    result = hair_network._convolve(x, weights, "entry", stride=2)
-    window = x[:, 3:6, 1:4]
-    assert result.shape == (len(kernels), 4, 4)
-    assert np.allclose(result[:, 2, 1], (kernels * window).sum(axis=(1, 2, 3)) + bias, atol=1e-4)
-
-
 @pytest.mark.parametrize("size", [(160, 120), (90, 300), (1, 7), (1, 1)])
 def test_the_upper_middle_of_a_crop_is_seen_twice(
     size: tuple[int, int], monkeypatch: pytest.MonkeyPatch

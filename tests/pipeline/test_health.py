@@ -62,7 +62,7 @@ class Run:
         points = head.vertices[head.landmark_vertices].astype(np.float64)
         plugins = Manager.loaded(autoload=False)
         self.hull: Hull = plugins.call(
-            "build_hull", "visual_hull", scene=self.scene, masks=self.masks
+            "build_hull", "visual_hull", scene=self.scene, masks=self.masks, orientations=()
         )
         self.groom: Groom = grow("short", head, ROOTS, seed=1)
         photos = draw_views(densify(self.groom, HAIRS), head, cameras)

@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 import math
 import os
-import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -169,43 +168,41 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("--folds", action="store_true", help="train without each capture, too")
     args = parser.parse_args(words)
     device = "cuda" if torch.cuda.is_available() else "cpu"
-    began = time.perf_counter()
-
-    def tell(what: str) -> None:
-        print(f"{time.perf_counter() - began:.0f} s: {what}", flush=True)
-
     captured = captured_shapes(args.captures, np.random.default_rng(0)) if args.captures else []
-    names = [shape.name for shape in captured]
     shapes = random_shapes(range(args.grooms), args.workers)
-    tell(f"{len(shapes)} grooms and {', '.join(names)}")
     spared = len(shapes) // 10
-    owners = torch.tensor(
-        [-1] * spared + [0] * (len(shapes) - spared) + list(range(1, len(names) + 1))
-    ).to(device)
-    features, depths, drawn = draw(Shapes(shapes + captured, device), owners, args.views, 0)
-    tell(f"{len(features)} views")
+    owners = [-1] * spared + [0] * (len(shapes) - spared) + list(range(1, len(captured) + 1))
+    views = draw(Shapes(shapes + captured, device), torch.tensor(owners).to(device), args.views, 0)
+    names = [shape.name for shape in captured]
+    for suffix, left_out in folds(names).items() if args.folds else [("", [])]:
+        weights = fit(views, left_out, args.steps, names)
+        save(weights, args.output.with_stem(args.output.stem + suffix))
 
-    def fit(left_out: Sequence[int], name: str) -> None:
-        out = torch.zeros_like(drawn, dtype=torch.bool)
-        for owner in (-1, *left_out):
-            out |= drawn == owner
-        inside = torch.nonzero(~out)[:, 0]
-        weights = train(features, depths, inside, args.steps, 0)
-        tell(f"trained {name}")
-        for owner in (-1, *left_out):
-            here = drawn == owner
-            title = "grooms left out" if owner < 0 else names[owner - 1]
-            report(f"  {title}", weights, features[here], depths[here])
-        save(weights, args.output.with_stem(f"{args.output.stem}{name}"))
 
-    fit([], "")
-    if args.folds:
-        fit(range(1, len(names) + 1), "-synth")
-        kinds: dict[str, list[int]] = {}
-        for k, name in enumerate(names, 1):
-            kinds.setdefault(name.split("_")[0], []).append(k)
-        for name, left_out in kinds.items():
-            fit(left_out, f"-without-{name}")
+def folds(names: Sequence[str]) -> dict[str, list[int]]:
+    """Return which captures (1 is the first) to leave out, by the end of a file's name.
+
+    Captures whose names begin alike have the same hair.
+    """
+    every = list(range(1, len(names) + 1))
+    kinds: dict[str, list[int]] = {"": [], "-synth": every}
+    for k, name in zip(every, names, strict=True):
+        kinds.setdefault(f"-without-{name.split('_')[0]}", []).append(k)
+    return kinds
+
+
+def fit(
+    views: tuple[Tensor, Tensor, Tensor], left_out: Sequence[int], steps: int, names: Sequence[str]
+) -> dict[str, Tensor]:
+    """Return weights trained without some captures, and print the errors on those."""
+    features, depths, owners = views
+    inside = torch.nonzero(~torch.isin(owners, torch.tensor([-1, *left_out]).to(owners)))[:, 0]
+    weights = train(features, depths, inside, steps, 0)
+    for owner in (-1, *left_out):
+        here = owners == owner
+        title = "grooms left out" if owner < 0 else names[owner - 1]
+        report(title, weights, features[here], depths[here])
+    return weights
 
 
 if __name__ == "__main__":

@@ -21,7 +21,8 @@ from numpy.random import Generator
 from torch import Tensor
 
 from hairkit.imaging.hair_features import CHANNELS, GRID
-from hairkit.imaging.hair_network import MIRRORED, read_weights, run_network
+from hairkit.imaging.hair_network import MIRRORED
+from hairkit.imaging.unet import read_weights, run_network
 
 from .colours import Array
 

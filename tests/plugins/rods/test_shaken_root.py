@@ -16,7 +16,14 @@ from hairkit.testing import bristle_groom
 from hairkit.types.strands import Strands
 
 SIZE, RATE, SECONDS = 0.002, 60, 3
-FREE = {"stiffness": 0.0, "bend": 0.0, "damping": 0.0, "cohesion": 0.0, "pressure": 0.0}
+FREE = {
+    "stiffness": 0.0,
+    "bend": 0.0,
+    "damping": 0.0,
+    "cohesion": 0.0,
+    "pressure": 0.0,
+    "adhesion": 0.0,
+}
 """What would hold or slow the hair, besides the air."""
 
 
