@@ -37,8 +37,8 @@ HEAD_SCALE, DEPTH_SCALE = 0.1, 0.1
 FINE = 4
 """Pixels of the answer along an edge of a cell."""
 NEARER = 0.02
-"""How far before the depth that the network tells hair begins, metres: single strands stand off,
-and the 2,000 of a groom that it learnt from are a twentieth of a head's.
+"""How far before the depth that the network tells hair begins, metres: it learnt from a twentieth
+of a head's strands. Visible F at 4 mm/40 of five fronts: 43.4 with 0.01, 45.3, and 48.0 with 0.02.
 """
 
 
