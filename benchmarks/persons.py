@@ -34,6 +34,7 @@ from video import (
 from hairkit.head_model.template import default_head
 from hairkit.rendering.picture import draw_views
 from hairkit.synth import STYLES, Style, StyleName, grow
+from hairkit.synth.growth import cut_strands
 from hairkit.synth.photographs import Shoot, cluttered_room
 from hairkit.types.groom import Groom
 from hairkit.types.head import Head
@@ -143,11 +144,7 @@ def _with_fringe(groom: Groom, points: int, generator: np.random.Generator) -> G
     line = BROWS + FRINGE_SPREAD * generator.standard_normal(len(paths))
     before = (np.abs(paths[..., 0]) < FACE[0]) & (paths[..., 2] > FACE[1])
     below = before & (paths[..., 1] < line[:, None])
-    last = np.where(below.any(axis=1), np.maximum(below.argmax(axis=1), 4), points - 1)
-    place = np.linspace(0, 1, points) * last[:, None]
-    low = np.minimum(place.astype(np.int64), points - 2)
-    rows, share = np.arange(len(paths))[:, None], (place - low)[..., None]
-    cut = paths[rows, low] * (1 - share) + paths[rows, low + 1] * share
+    cut = cut_strands(paths, below, 4)
     strands = groom.strands
     flat = cut.reshape(-1, 3).astype(np.float32)
     return replace(groom, strands=Strands(flat, strands.offsets, root_uv=strands.root_uv))

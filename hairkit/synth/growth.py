@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from hairkit.arrays import Float32Array, Int64Array
+from hairkit.arrays import BoolArray, Float32Array, Int64Array
 from hairkit.errors import InputError
 from hairkit.head_model.scalp import sample_roots
 from hairkit.synth.bust import Bust, Obstacle
@@ -242,10 +242,17 @@ def _cut(look: Style, paths: Float32Array, generator: np.random.Generator) -> Fl
     """Return the strands cut off where they first come below the line, points spread again."""
     if look.cut is None:
         return paths
+    line = look.cut + CUT_SPREAD * generator.standard_normal((len(paths), 1))
+    return cut_strands(paths, paths[..., 1] < line)
+
+
+def cut_strands(paths: Float32Array, beyond: BoolArray, least: int = 2) -> Float32Array:
+    """Return strands (N, m, 3) cut off at their first point `beyond` (N, m), points spread again.
+
+    Each keeps its first `least` segments.
+    """
     count, m, _ = paths.shape
-    line = look.cut + CUT_SPREAD * generator.standard_normal((count, 1))
-    below = paths[..., 1] < line
-    last = np.where(below.any(axis=1), np.maximum(below.argmax(axis=1), 2), m - 1)
+    last = np.where(beyond.any(axis=1), np.maximum(beyond.argmax(axis=1), least), m - 1)
     place = np.linspace(0, 1, m)[None, :] * last[:, None]
     low = np.minimum(place.astype(np.int64), m - 2)
     t = (place - low)[..., None].astype(np.float32)

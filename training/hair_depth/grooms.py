@@ -18,6 +18,7 @@ from hairkit.head_model.template import default_head
 from hairkit.io.mesh_text import read_obj
 from hairkit.synth import STYLES, Style, grow
 from hairkit.synth.bust import Bust
+from hairkit.synth.growth import cut_strands
 from hairkit.types.head import JAW_LANDMARKS, Head
 
 STRANDS, POINTS = 2000, 40
@@ -126,7 +127,7 @@ def _captured(truth: Path, rng: np.random.Generator) -> Shape:
     strands, mesh = np.load(truth / "strands.npz"), read_obj(truth / "head.obj")
     points, offsets = strands["points"], strands["offsets"]
     chosen = rng.choice(len(offsets) - 1, STRANDS)
-    paths = np.stack([_at(points[offsets[k] : offsets[k + 1]]) for k in chosen])
+    paths = np.concatenate([_resampled(points[None, offsets[k] : offsets[k + 1]]) for k in chosen])
     said = json.loads((truth / "truth.json").read_text())["landmarks3d"]
     marks = np.array(said["xyz"] if isinstance(said, dict) else said)[JAW_LANDMARKS:]
     head = default_head()
@@ -144,14 +145,6 @@ def _captured(truth: Path, rng: np.random.Generator) -> Shape:
     )
 
 
-def _at(path: Float32Array) -> Float32Array:
-    """Return POINTS evenly spread points of a strand (n, 3)."""
-    place = np.linspace(0, len(path) - 1, POINTS)
-    low = np.minimum(place.astype(int), len(path) - 2)
-    share = (place - low)[:, None]
-    return np.asarray(path[low] * (1 - share) + path[low + 1] * share, np.float32)
-
-
 def _resampled(paths: Float32Array) -> Float32Array:
     """Return strands (N, n, 3) with POINTS points each."""
     place = np.linspace(0, paths.shape[1] - 1, POINTS)
@@ -165,12 +158,7 @@ def _with_fringe(paths: Float32Array, rng: np.random.Generator) -> Float32Array:
     line = rng.uniform(-0.06, 0.01) + 0.005 * rng.standard_normal((len(paths), 1))
     before = (np.abs(paths[..., 0]) < FRINGE[0]) & (paths[..., 2] > FRINGE[1])
     below = before & (paths[..., 1] < line)
-    points = paths.shape[1]
-    last = np.where(below.any(axis=1), np.maximum(below.argmax(axis=1), 4), points - 1)
-    place = np.linspace(0, 1, points) * last[:, None]
-    low = np.minimum(place.astype(int), points - 2)
-    rows, share = np.arange(len(paths))[:, None], (place - low)[..., None]
-    return np.asarray(paths[rows, low] * (1 - share) + paths[rows, low + 1] * share, np.float32)
+    return cut_strands(paths, below, 4)
 
 
 def _scattered(
