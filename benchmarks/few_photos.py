@@ -17,9 +17,11 @@ import json
 import shutil
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from unittest import mock
 
 import cv2
 import numpy as np
@@ -37,7 +39,9 @@ from hairkit.evaluation.depth_map import (
     near_some_surface,
 )
 from hairkit.evaluation.scores import OUTER_DEPTH, sample_hits, sample_strands, scores_of_hits
+from hairkit.field import hair_depth
 from hairkit.head_model.template import default_head
+from hairkit.imaging.unet import read_weights
 from hairkit.io.capture_reader import TURN, photo_files
 from hairkit.pipeline.recipe import load_recipe
 from hairkit.pipeline.reconstruct import reconstruct
@@ -59,6 +63,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     add_captures(parser)
     parser.add_argument("--photos", type=int, nargs="+", default=[1, 2, 3, 8])
+    parser.add_argument(
+        "--weights", type=Path, help="folder of `training.hair_depth.train --folds`: each head by "
+        "the network that was trained without it",
+    )  # fmt: skip
     arguments = parser.parse_args()
     if arguments.captures is None:
         print(NO_CAPTURES)
@@ -69,13 +77,25 @@ def main() -> None:
         rows = []
         for folder in sorted(path.parent for path in Path(arguments.captures).glob("*/truth")):
             try:
-                rows.append(_figures(folder, PHOTOS.get(count, list(TURN))))
+                with _spared(folder.name, arguments.weights):
+                    rows.append(_figures(folder, PHOTOS.get(count, list(TURN))))
             except InputError as error:
                 print(f"| {folder.name} | {count} | refused: {error} |", flush=True)
                 continue
             print(_row(folder.name, count, rows[-1]), flush=True)
         if rows:
             print(_row("mean", count, np.mean(rows, axis=0).tolist()), flush=True)
+
+
+@contextmanager
+def _spared(head: str, folder: Path | None) -> Iterator[None]:
+    """Let the network of depths be the one that was trained without a head."""
+    if folder is None:
+        yield
+        return
+    weights = read_weights(folder / f"hair_depth-without-{head.split('_')[0]}.npz")
+    with mock.patch.object(hair_depth, "shipped_weights", return_value=weights):
+        yield
 
 
 def _row(name: str, count: int, figures: Sequence[float]) -> str:

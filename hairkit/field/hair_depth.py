@@ -2,16 +2,14 @@
 
 One photo tells nothing of its rays' third dimension but by what hair is like. A U-Net sees, in an
 upright view of the head, hair, skin and clothes, the strands' directions and the depth of the
-fitted head, and answers with the depths of the first hair, of the end of its first layer, which
-nothing uses, and of the last hair behind it. `training/hair_depth` in the repository trained it
-on views of procedural grooms of random styles and heads, and on those of path-traced captures.
+fitted head, and answers with the depths of the first and the last hair. `training/hair_depth` in
+the repository trained it on views of procedural grooms of random styles and heads, and on those of
+path-traced captures.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
-from importlib import resources
 
 import cv2
 import numpy as np
@@ -19,7 +17,7 @@ import numpy.typing as npt
 
 from hairkit.arrays import BoolArray, Float32Array, Float64Array
 from hairkit.cameras.depth_raster import head_depth
-from hairkit.imaging.unet import Weights, read_weights, run_network
+from hairkit.imaging.unet import run_network, shipped_weights
 from hairkit.types.camera import Camera
 from hairkit.types.head import Head
 from hairkit.types.mask import Mask
@@ -28,7 +26,7 @@ from hairkit.types.orientation import OrientationMap
 GRID, WINDOW, ABOVE = 128, 0.64, 0.22
 """Cells along an edge of the network's window; its edge, and how much of it lies above the head's
 middle, metres."""
-CHANNELS, LAYERS = 9, 3
+CHANNELS, LAYERS = 9, 2
 """Features, and depths, of a cell."""
 MIRRORED = (4, 7)
 """Features that change their sign in a mirrored photo: the strands' slope, and the place across."""
@@ -47,6 +45,7 @@ class HairDepth:
     """Where hair begins and ends along the rays of an upright view of the head."""
 
     camera: Camera
+    """That of the photo, upright, its window about the head's middle."""
     seen: BoolArray
     """(H, W) where the photo shows hair."""
     first: Float32Array
@@ -113,10 +112,12 @@ def guess_hair_depth(
     values = np.stack(features).astype(np.float32)
     mirrored = values[..., ::-1].copy()
     mirrored[list(MIRRORED)] *= -1
-    first, second = (run_network(each, _shipped_weights()) for each in (values, mirrored))
+    first, second = (
+        run_network(each, shipped_weights("field", "hair_depth.npz")) for each in (values, mirrored)
+    )
     scores = (first + second[..., ::-1]) / 2
     fine = (FINE * GRID, FINE * GRID)
-    nearest, _, last = (cv2.resize(at + DEPTH_SCALE * layer, fine) for layer in scores)
+    nearest, last = (cv2.resize(at + DEPTH_SCALE * layer, fine) for layer in scores)
     return HairDepth(upright.resized(*fine), cv2.resize(seen, fine) > 0.5, nearest - NEARER, last)
 
 
@@ -131,10 +132,3 @@ def upright_camera(camera: Camera, middle: Float64Array) -> Camera:
         distance=distance, target=middle, focal=GRID / WINDOW * (1 if flat else distance),
         width=GRID, height=GRID, centre=(GRID / 2, GRID * ABOVE / WINDOW), model=camera.model,
     )  # fmt: skip
-
-
-@cache
-def _shipped_weights() -> Weights:
-    path = resources.files("hairkit") / "field" / "hair_depth.npz"
-    with resources.as_file(path) as file:
-        return read_weights(file)

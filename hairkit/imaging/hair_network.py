@@ -11,8 +11,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
-from functools import cache
-from importlib import resources
 from typing import Any
 
 import cv2
@@ -21,7 +19,7 @@ import numpy.typing as npt
 
 from hairkit.arrays import Float32Array, Float64Array, UInt8Array
 from hairkit.imaging.hair_features import hair_features
-from hairkit.imaging.unet import Weights, read_weights, run_network
+from hairkit.imaging.unet import run_network, shipped_weights
 from hairkit.types.capture import View
 from hairkit.types.person import Person
 
@@ -149,7 +147,7 @@ def hair_probability(
     mirrored = np.zeros_like(features.values)
     mirrored[:, :rows, :columns] = features.values[:, :rows, :columns][..., ::-1]
     mirrored[list(MIRRORED)] *= -1
-    weights = _shipped_weights()
+    weights = shipped_weights("imaging", "hair_network.npz")
     first = _softmax(run_network(features.values, weights))[:, :rows, :columns]
     second = _softmax(run_network(mirrored, weights))[:, :rows, :columns][..., ::-1]
     mean = np.moveaxis(np.asarray((first + second) / 2, np.float32), 0, -1)
@@ -167,10 +165,3 @@ def hair_probability(
 def _softmax(scores: Float32Array) -> Float32Array:
     odds = np.exp(scores - scores.max(axis=0))
     return np.asarray(odds / odds.sum(axis=0), np.float32)
-
-
-@cache
-def _shipped_weights() -> Weights:
-    path = resources.files("hairkit") / "imaging" / "hair_network.npz"
-    with resources.as_file(path) as file:
-        return read_weights(file)

@@ -7,6 +7,8 @@ It has a stride of two at its entry and a sub-pixel convolution at its end (Shi 
 from __future__ import annotations
 
 import os
+from functools import cache
+from importlib import resources
 
 import numpy as np
 
@@ -38,6 +40,13 @@ def run_network(values: Float32Array, weights: Weights) -> Float32Array:
 def read_weights(path: str | os.PathLike[str]) -> Weights:
     """Return the weights in a file of `training/hair_network`."""
     return {name: array.astype(np.float32) for name, array in read_npz(path).items()}
+
+
+@cache
+def shipped_weights(package: str, name: str) -> Weights:
+    """Return the weights in a file of one of hairkit's packages, such as `imaging`."""
+    with resources.as_file(resources.files("hairkit") / package / name) as file:
+        return read_weights(file)
 
 
 def _convolve(x: Float32Array, weights: Weights, name: str, stride: int = 1) -> Float32Array:

@@ -70,6 +70,7 @@ def stage_digests(roots: Roots, monkeypatch: pytest.MonkeyPatch) -> dict[str, st
         ("plugins/silhouette/landmark_transfer.py", "scene"),
         ("plugins/tensor_diffusion.py", ""),
         ("hairkit/imaging/hair_network.npz", "segment"),
+        ("hairkit/field/hair_depth.npz", "hull"),
         ("hairkit/head_model/template_skin.jpg", ""),
         ("hairkit/recipes/thesis.toml", ""),
     ],

@@ -91,11 +91,10 @@ def vary(x: Tensor, y: Tensor, random: torch.Generator) -> tuple[Tensor, Tensor]
     return torch.cat([seen, head, x[:, 6:]], 1), torch.where(valid, y, math.nan)
 
 
-def errors(scores: Tensor, depths: Tensor) -> tuple[Tensor, Tensor]:
-    """Return the absolute errors (n,) of each seen depth in metres, and their view."""
-    known = torch.isfinite(depths).all(1)
+def errors(scores: Tensor, depths: Tensor) -> Tensor:
+    """Return the absolute errors (n, LAYERS) where hair is seen, metres."""
     gap = (scores * DEPTH_SCALE - depths).abs()
-    return gap.movedim(1, -1)[known], known
+    return gap.movedim(1, -1)[torch.isfinite(depths).all(1)]
 
 
 def train(
@@ -106,7 +105,7 @@ def train(
     random = torch.Generator(device).manual_seed(seed)
     weights = {
         name: value.to(device).requires_grad_()
-        for name, value in new_weights(seed, CHANNELS).items()
+        for name, value in new_weights(seed, CHANNELS, LAYERS).items()
     }
     mean = {name: value.detach().clone() for name, value in weights.items()}
     optimizer = torch.optim.AdamW(weights.values(), RATE, weight_decay=DECAY)
@@ -117,7 +116,7 @@ def train(
         x, y = vary(features[chosen].float(), depths[chosen].float(), random)
         with torch.autocast(device.type, torch.bfloat16):
             scores = network(weights, x)
-        gaps, _ = errors(scores.float(), y)
+        gaps = errors(scores.float(), y)
         value = F.smooth_l1_loss(gaps / DEPTH_SCALE, torch.zeros_like(gaps), beta=0.05)
         optimizer.zero_grad()
         value.backward()
@@ -139,10 +138,10 @@ def report(name: str, weights: dict[str, Tensor], features: Tensor, depths: Tens
         x, y = features[first : first + BATCH].float(), depths[first : first + BATCH].float()
         x, y = vary(x, y, random)
         with torch.no_grad():
-            found.append(errors(network(weights, x), y)[0])
+            found.append(errors(network(weights, x), y))
     gaps = torch.cat(found)
     print(
-        f"{name}: {len(features)} views, mean error front, end of the first layer, back, mm:"
+        f"{name}: {len(features)} views, mean error front, back, mm:"
         f" {', '.join(f'{1e3 * g:.1f}' for g in gaps.mean(0).tolist())}; median"
         f" {', '.join(f'{1e3 * g:.1f}' for g in gaps.median(0).values.tolist())}",
         flush=True,

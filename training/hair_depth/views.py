@@ -17,8 +17,6 @@ BETWEEN = 3
 """Points drawn for each of a strand."""
 FIRST = 0.008
 """Depth behind the first hair in which directions are seen, metres."""
-GAP, ROUNDS = 0.012, 6
-"""Hair farther behind the last one than this is another layer, metres; and how often to look."""
 UNDER = 0.004
 """Metres under the surface of the skin at which hair is still seen."""
 CELLS = GRID * GRID
@@ -134,10 +132,6 @@ def _pictures(
 ) -> tuple[Tensor, Tensor]:
     cell, depth, _ = view.place(hair)
     front = _least(cell, depth)
-    last = front
-    for _ in range(ROUNDS):
-        within = torch.where(depth <= last.gather(1, cell) + GAP, depth, -math.inf)
-        last = -_least(cell, -within)
     end = -_least(cell, -depth)
     seen = depth <= front.gather(1, cell) + FIRST
     local = along @ view.rotation.transpose(1, 2)
@@ -146,9 +140,8 @@ def _pictures(
     for k, values in enumerate((angle.cos(), angle.sin(), torch.ones_like(angle))):
         sums[:, k].scatter_add_(1, cell, values * seen)
     head, torso = _surface(view, skin), _surface(view, clothes)
-    front, last, end, sums = front[:, :-1], last[:, :-1], end[:, :-1], sums[..., :-1]
-    front = _closed(front)
-    last, end = torch.maximum(last, front), torch.maximum(end, front)
+    front, end, sums = _closed(front[:, :-1]), end[:, :-1], sums[..., :-1]
+    end = torch.maximum(end, front)
     body = torch.minimum(head + UNDER, torso)
     visible = front < body
     person = ~visible & torch.isfinite(body)
@@ -162,7 +155,7 @@ def _pictures(
     ]  # fmt: skip
     assert len(planes) == CHANNELS
     features = torch.stack(planes, 1).unflatten(2, (GRID, GRID))
-    depths = torch.stack([front, last, end], 1)
+    depths = torch.stack([front, end], 1)
     assert depths.shape[1] == LAYERS
     depths = torch.where(visible[:, None], depths, math.nan).unflatten(2, (GRID, GRID))
     return features, depths

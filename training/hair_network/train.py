@@ -43,14 +43,14 @@ POOR = 0.12
 """Share of the pictures in parts of which the person is uncertain."""
 
 
-def new_weights(seed: int, channels: int = CHANNELS) -> dict[str, Tensor]:
+def new_weights(seed: int, channels: int = CHANNELS, answers: int = 3) -> dict[str, Tensor]:
     """Return kernels (C out, C in, k, k) and biases (C out,) of every layer, by its name."""
     shapes = {"entry": (WIDTHS[0], channels, 3), "first": (WIDTHS[0], WIDTHS[0], 3)}
     for level, (fine, coarse) in enumerate(pairwise(WIDTHS)):
         shapes[f"down{level}a"] = (coarse, fine, 3)
         shapes[f"down{level}b"] = (coarse, coarse, 3)
         shapes[f"up{level}"] = (fine, fine + coarse, 3)
-    shapes["exit"] = (12, WIDTHS[0], 1)
+    shapes["exit"] = (4 * answers, WIDTHS[0], 1)
     generator = torch.Generator().manual_seed(seed)
     weights = {}
     for name, (outputs, inputs, edge) in shapes.items():
