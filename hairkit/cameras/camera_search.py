@@ -2,13 +2,13 @@
 
 How carefully the turn was taken is found with the cameras: the prior's precision is the mean of its
 posterior, a gamma distribution, given the deviations found and their covariance (expectation
-maximisation; MacKay, "Bayesian interpolation", 1992). A careful turn is held to even steps; in a
-careless one single views are started again from other azimuths.
+maximisation; MacKay, "Bayesian interpolation", 1992): a careful turn is held to even steps. The
+search starts again from turns whose steps are long on one side and short on the other.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -30,19 +30,15 @@ CARE_ROUNDS = 2
 CARE_FREEDOM = 4.0
 """Degrees of freedom of the prior of the precision, whose mean is 1; a turn of eight has 48
 deviations."""
-CARELESS = 0.7
-"""Precision below which single views are started again; it is 0.8 to 5 in careful turns, and 0.15
-to 0.6 in nine whose steps were up to 12 degrees off."""
-RESTART = 2.5
-"""How far from where it is found a view is started again, standard deviations of its azimuth."""
-RESTART_NOISE, RESTART_ROUNDS = (2.0, 1.0), 6
-"""Times the noise of outlines, and rounds at each, by which starts are compared."""
+UNEVEN, SIDES = np.radians(18), 8
+"""Amplitude of the wave once around that is added to the azimuths of further starts, and how many
+phases it has."""
+UNEVEN_NOISE, UNEVEN_ROUNDS = (2.0, 1.0), 6
+"""Times the noise of outlines, and rounds at each, by which these starts are compared."""
 FARTHER, FARTHER_NOISE, MOST_FARTHER = 1.2, (4.0, 2.0), 6
 """Factor by which all distances are tried anew, times the noise of outlines in these rounds, and
 most steps one way. A search ends near the distance from which it starts: of 20 turns without EXIF
 the focal length was 0.7 to 1.2 of the true one, and with steps 0.9 to 1.2."""
-MOST_RESTARTED = 12
-"""Views of turns of more are not started again: their neighbours are near and hold them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,15 +81,13 @@ class Search:
     any_distance: bool = True
     """False where the perspective is known."""
 
-    def find(self, start: Fit, restarted: Iterable[int]) -> Fit:
-        """Return the best solution; `restarted` are the views that may be anywhere."""
+    def find(self, start: Fit, azimuths: Float64Array) -> Fit:
+        """Return the best solution; `azimuths` (views,) are the nominal ones, radians."""
         fit = self._from_coarse(start, COARSE_TO_FINE)
         if self.any_distance and not fit.flat:
             fit = self._from_distances(fit)
-        views = (len(self.spread) - SHARED) // PER_VIEW
-        if fit.precision < CARELESS and views <= MOST_RESTARTED:
-            fit = self.settle(self._restart(fit, restarted), 1)
-        return fit
+        uneven = self._from_uneven_turns(fit, azimuths)
+        return fit if uneven is fit else self.settle(uneven, 1)
 
     def _from_coarse(self, fit: Fit, noises: Sequence[float]) -> Fit:
         """Return the solution to which rounds with these times the noise lead."""
@@ -191,18 +185,19 @@ class Search:
         precision = (len(own) + CARE_FREEDOM) / (float(own.sum()) + CARE_FREEDOM)
         return replace(fit, precision=precision)
 
-    def _restart(self, fit: Fit, views: Iterable[int]) -> Fit:
-        """Return the best of the solutions to which starts at other azimuths of one view lead."""
+    def _from_uneven_turns(self, fit: Fit, azimuths: Float64Array) -> Fit:
+        """Return the best of the solutions to which turns lead that are slow on one side.
+
+        Opposite views have mirrored outlines and hold each other where they are; such turns move
+        them against each other.
+        """
         best = fit
-        for view in views:
-            place = SHARED + PER_VIEW * view
-            away = RESTART * self.spread[place] / np.sqrt(fit.precision)
-            for side in (-away, away):
-                vector = fit.vector.copy()
-                vector[place] += side
-                trial = replace(fit, vector=vector)
-                for noise in RESTART_NOISE:
-                    trial, _ = self.descend(trial, noise, RESTART_ROUNDS)
-                if trial.cost < best.cost:
-                    best = trial
+        for phase in np.linspace(0, 2 * np.pi, SIDES, endpoint=False):
+            vector = fit.vector.copy()
+            vector[SHARED::PER_VIEW] += UNEVEN * np.cos(azimuths - phase)
+            trial = replace(fit, vector=vector)
+            for noise in UNEVEN_NOISE:
+                trial, _ = self.descend(trial, noise, UNEVEN_ROUNDS)
+            if trial.cost < best.cost:
+                best = trial
         return best

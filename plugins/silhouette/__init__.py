@@ -72,8 +72,7 @@ def _from_nothing(problem: TurnFit, search: Search, capture: Capture, options: O
     wanted = "orthographic" if capture.orthographic else "perspective"
     if options.model != "auto":
         wanted = options.model
-    faceless = [i for i, view in enumerate(capture.views) if view.landmarks is None]
-    best = search.find(problem.start(wanted == "orthographic"), faceless)
+    best = search.find(problem.start(wanted == "orthographic"), problem.turn.azimuths)
     if options.model == "auto" and not capture.orthographic:
         flat, _ = search.descend(problem.start(True), FLAT_NOISE, FLAT_ROUNDS)
         if search.cost(flat, problem.evidence(flat, 1.0)) < FLAT_HOPE * best.cost:

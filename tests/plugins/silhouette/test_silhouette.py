@@ -11,7 +11,7 @@ from turntable import Turntable, azimuth_errors, turntable
 
 from hairkit import Camera, Capture, Face, Mask, Scene, View
 from hairkit.cameras import camera_search
-from hairkit.cameras.camera_search import Evidence, Fit
+from hairkit.cameras.camera_search import Evidence, Fit, Search
 from hairkit.cameras.turn_fit import TurnFit
 from hairkit.cameras.turntable import LOG_MAGNIFICATION, PER_VIEW, SHARED
 
@@ -104,6 +104,33 @@ def test_the_focal_length_of_a_far_camera_is_found(monkeypatch: pytest.MonkeyPat
     assert focal() == pytest.approx(1, abs=0.15)
     monkeypatch.setattr(camera_search, "MOST_FARTHER", 0)
     assert focal() < 0.75
+
+
+def test_opposite_views_that_hold_each_other_are_moved(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Views at 45 and 225 degrees are 20 degrees off, each as far as the other's outline asks."""
+    azimuths, deep = np.arange(8) * np.pi / 4, np.radians(-20)
+    off = np.where(np.arange(8) == 1, 1.0, 0.0) - np.where(np.arange(8) == 5, 1.0, 0.0)
+    size = SHARED + PER_VIEW * 8
+
+    def evidence(fit: Fit, coarseness: float) -> Evidence:
+        """Two valleys along `off`: a shallow one where the views are, a deep one at `deep`."""
+        along = float(fit.vector[SHARED::PER_VIEW] @ off) / 2
+        turn = np.pi * along / deep
+        misses = np.array([10 * np.sin(turn), 3 * (1 - along / deep)])
+        slope = np.array([10 * np.pi / deep * np.cos(turn), -3 / deep])
+        rows = np.zeros((2, size))
+        rows[:, SHARED::PER_VIEW] = np.outer(slope, off) / 2
+        return Evidence(float(misses @ misses), rows.T @ rows, -rows.T @ misses, None)
+
+    def found() -> float:
+        start = np.zeros(size)
+        search = Search(evidence, np.ones(size), 20, any_distance=False)
+        fit = search.find(Fit(start, np.zeros((68, 3)), True, start), azimuths)
+        return float(fit.vector[SHARED::PER_VIEW] @ off) / 2
+
+    assert found() == pytest.approx(deep, rel=0.1)
+    monkeypatch.setattr(camera_search, "SIDES", 0)
+    assert abs(found()) < np.radians(3)
 
 
 def test_nothing_is_evaluated_twice(bust: Turntable, monkeypatch: pytest.MonkeyPatch) -> None:
