@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 from captures_argument import NO_CAPTURES, add_captures
 
+from hairkit.errors import InputError
 from hairkit.manager import Manager
 from hairkit.types.capture import View
 from hairkit.types.mask import HAIR
@@ -87,8 +88,11 @@ def _score(photo: Path, mask: Path, manager: Manager, arguments: argparse.Namesp
         face = manager.find_first("detect_landmarks", [(FACES, None)], view=view)
         person = manager.find_first("segment_person", [(PERSONS, None)], view=view)
         view = replace(view, face=face and face[1], person=person and person[1])
-    hair = manager.call("segment", "auto_matte", view=view).hair
     true = truth == HAIR
+    try:
+        hair = manager.call("segment", "auto_matte", view=view).hair
+    except InputError:  # no hair found
+        hair = np.zeros_like(true)
     if arguments.overlays:
         picture = (view.image * 0.6).astype(np.uint8)
         picture[hair & ~true], picture[true & ~hair] = (255, 0, 0), (0, 255, 0)

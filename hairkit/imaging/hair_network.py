@@ -1,10 +1,10 @@
 """A small convolutional network that tells hair from the rest of a person and the background.
 
 A U-Net (`hairkit.imaging.unet`) on the features of `hairkit.imaging.hair_features`. It was
-trained on 4,800 and then 4,167 pictures made of renders alone, of path-traced heads and of
-`hairkit synth`, whose hair, skin, clothes and surroundings were recoloured and warped at random,
-with painted bodies, plaits, beards, glasses and bald crowns; `training/hair_network` in the
-repository does that.
+trained on 12,917 pictures made of renders alone, of path-traced heads and of `hairkit synth`,
+whose hair, skin, clothes and surroundings were recoloured and warped at random, with painted
+bodies, plaits, beards, glasses and bald crowns; `training/hair_network` in the repository does
+that.
 """
 
 from __future__ import annotations

@@ -10,13 +10,16 @@ import numpy as np
 import pytest
 
 from hairkit.imaging.hair_features import CHANNELS, GRID
+from hairkit.synth.bust import Bust
 from hairkit.types.mask import BACKGROUND, HAIR, PERSON
+from training.hair_depth.grooms import random_groom
+from training.hair_network import heads
 from training.hair_network.bodies import dress
 from training.hair_network.colours import noise, recolour
 from training.hair_network.compose import label_shares
 from training.hair_network.composer import compose, place
 from training.hair_network.looks import fade_hair
-from training.hair_network.renders import Render
+from training.hair_network.renders import Render, read_renders
 
 
 @pytest.fixture
@@ -44,6 +47,20 @@ def test_equal_seeds_make_equal_pictures(render: Render) -> None:
         assert one.image.shape == (*one.labels.shape, 3)
         assert 639 <= max(one.labels.shape) <= 640
         assert set(np.unique(one.labels)) <= {BACKGROUND, PERSON, HAIR}
+
+
+def test_draped_hair_lies_on_the_shoulders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It ends below them, outside of the torso; its photos are read as renders."""
+    groom = random_groom(2000, 60, draped=True)
+    tips = groom.strands.points[groom.strands.offsets[1:] - 1].astype(np.float64)
+    assert np.median(tips[:, 1]) < -0.22
+    assert not Bust.under(groom.head).contains(tips).any()
+    monkeypatch.setattr(heads, "STRANDS", 60)
+    monkeypatch.setattr(heads, "SIZES", ((90, 120),))
+    heads.photographed(tmp_path, draped=True, seed=2000)
+    renders = read_renders(tmp_path)
+    assert [each.labels.shape for each in renders] == [(120, 90)] * 8
+    assert all(each.head.any() for each in renders)
 
 
 def test_labels_move_with_the_picture(render: Render) -> None:

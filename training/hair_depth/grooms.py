@@ -19,7 +19,9 @@ from hairkit.io.mesh_text import read_obj
 from hairkit.synth import STYLES, Style, grow
 from hairkit.synth.bust import Bust
 from hairkit.synth.growth import cut_strands
+from hairkit.types.groom import Groom
 from hairkit.types.head import JAW_LANDMARKS, Head
+from hairkit.types.strands import Strands
 
 STRANDS, POINTS = 2000, 40
 """Strands of a groom, and points of a strand."""
@@ -55,22 +57,45 @@ def random_shapes(seeds: Sequence[int], workers: int) -> list[Shape]:
 
 
 def random_shape(seed: int) -> Shape:
-    """Return a random groom on a random head."""
-    rng = np.random.default_rng([seed, 7])
-    head, look = random_head(rng), random_style(rng)
-    with mock.patch.dict(STYLES, {"straight": look}):
-        groom = grow("straight", head, STRANDS, seed)
-    paths = groom.strands.points.reshape(STRANDS, look.points, 3)
-    if look.length > 0.1 and not look.tail and rng.random() < 0.3:
-        paths = _with_fringe(paths, rng)
+    """Return the random groom of a seed as points."""
+    rng = np.random.default_rng([seed, 9])
+    groom = random_groom(seed, STRANDS)
+    head, strands = groom.head, groom.strands
     bust = Bust.under(head)
     return Shape(
         "synth",
-        _resampled(paths),
+        _resampled(strands.points.reshape(STRANDS, -1, 3)),
         _scattered(head.vertices, head.faces, SKIN, rng),
         _scattered(bust.vertices, bust.faces, CLOTHES, rng),
         head_middle(head).astype(np.float32),
     )
+
+
+def random_groom(seed: int, count: int, *, draped: bool = False) -> Groom:
+    """Return `count` strands of a random style, or draped over the shoulders, on a random head."""
+    rng = np.random.default_rng([seed, 7])
+    head, look = random_head(rng), random_style(rng)
+    if draped:
+        length, cut = float(rng.uniform(0.42, 0.65)), float(rng.uniform(-0.5, -0.25))
+        parting = 0.02 if look.parting is None else look.parting
+        look = replace(
+            look,
+            points=110,
+            length=length,
+            cut=cut,
+            parting=parting,
+            bend=0.028,
+            lift=0.3,
+            tail=0.0,
+        )
+    with mock.patch.dict(STYLES, {"straight": look}):
+        groom = grow("straight", head, count, seed)
+    if look.length <= 0.1 or look.tail or rng.random() >= 0.3:
+        return groom
+    strands = groom.strands
+    paths = _with_fringe(strands.points.reshape(count, look.points, 3), rng)
+    flat = paths.reshape(-1, 3)
+    return replace(groom, strands=Strands(flat, strands.offsets, root_uv=strands.root_uv))
 
 
 def random_head(rng: np.random.Generator) -> Head:

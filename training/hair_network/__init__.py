@@ -1,5 +1,6 @@
 """Training of the hair network that ships with hairkit (docs/segmentation.md).
 
+* `heads`: program that photographs random heads, with hair on the shoulders too
 * `renders`: rendered photos with their labels, heads and landmarks
 * `colours`: random colours, noise and textures
 * `bodies`: hair of other lengths over bodies with arms and clothes, hats, hoods, scarves, hands
