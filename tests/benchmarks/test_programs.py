@@ -94,7 +94,7 @@ SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
     "threads": ({"REPETITIONS": 1}, ["--runs", "2"]),
     "turn": ({"SHUFFLES": 1}, ["CAPTURES"]),
     "video": (
-        {"GUIDES": 60, "STRANDS": 300, "FRAMES": 60, "CROPPED": SMALL_LENS},
+        {"GUIDES": 60, "STRANDS": 1200, "FRAMES": 60, "CROPPED": SMALL_LENS},
         ["--styles", "short"],
     ),
     "viewer": (

