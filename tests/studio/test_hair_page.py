@@ -55,7 +55,7 @@ def test_a_brush_shows_while_it_is_led(page: Any, story: Any, brush: str) -> Non
     page.keyboard.press("p")
     for _ in range(3):
         page.keyboard.press("ArrowDown")
-    page.wait_for_function(changed, arg=[before, 0.002])
+    page.wait_for_function(changed, arg=[before, 0.0005])
     page.keyboard.press("Escape")
     page.wait_for_function(f"(given) => !({changed})(given)", arg=[before, 1e-6])
     assert strokes_over_hair(story) == kept
