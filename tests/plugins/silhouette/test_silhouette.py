@@ -71,13 +71,17 @@ def test_the_views_with_landmarks_are_sharp(bust: Turntable, found: Scene) -> No
     assert azimuth_errors(sharp, tuple(bust.cameras[i] for i in seen)).max() < 0.5
 
 
-def test_orthographic_pictures_are_recognised() -> None:
-    """Pictures of orthographic cameras on the exact turn give orthographic cameras there.
+def test_pictures_without_perspective_have_cameras_far_away() -> None:
+    """Pictures of orthographic cameras on the exact turn give cameras metres away, or theirs.
 
     Within a degree: the turn's precision is estimated, so an exact turn is not taken for granted.
     """
     table = turntable(np.random.default_rng(2), stray=0.0, model="orthographic")
     scene = estimate_scene(table.capture, table.masks, table.head, None, FAST)
+    assert all(np.linalg.norm(camera.position) > 2 for camera in scene.cameras)
+    assert azimuth_errors(scene.cameras, table.cameras).max() < 1.0
+    told = replace(table.capture, orthographic=True)
+    scene = estimate_scene(told, table.masks, table.head, None, FAST)
     assert {camera.model for camera in scene.cameras} == {"orthographic"}
     assert azimuth_errors(scene.cameras, table.cameras).max() < 1.0
     assert scene.cameras[0].focal == pytest.approx(800, rel=0.03)
@@ -93,9 +97,9 @@ def test_orthographic_cameras_start_at_their_scale() -> None:
 
 
 def test_the_focal_length_of_a_far_camera_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The search begins at 0.7 m, and stays near unless other distances are tried."""
+    """The search stays near where it begins unless other distances are tried."""
     table = turntable(np.random.default_rng(11), distance=1.4)
-    options = replace(FAST, model="perspective", carries=0)
+    options = replace(FAST, carries=0)
 
     def focal() -> float:
         scene = estimate_scene(table.capture, table.masks, table.head, None, options)
@@ -103,6 +107,7 @@ def test_the_focal_length_of_a_far_camera_is_found(monkeypatch: pytest.MonkeyPat
 
     assert focal() == pytest.approx(1, abs=0.15)
     monkeypatch.setattr(camera_search, "MOST_FARTHER", 0)
+    monkeypatch.setattr(camera_search, "FAR", 1.0)
     assert focal() < 0.75
 
 
@@ -143,7 +148,7 @@ def test_nothing_is_evaluated_twice(bust: Turntable, monkeypatch: pytest.MonkeyP
         return evidence(self, fit, coarseness)
 
     monkeypatch.setattr(TurnFit, "evidence", ask)
-    options = replace(FAST, model="perspective", carries=0)
+    options = replace(FAST, carries=0)
     estimate_scene(bust.capture, bust.masks, bust.head, None, options)
     assert len(asked) > 10
     assert len(asked) - len(set(asked)) <= 1  # a step may be too small to move anything
@@ -193,18 +198,6 @@ def test_landmarks_that_are_not_trusted_hardly_count_as_misfit(bust: Turntable) 
     assert residual(60.0) < 3 < residual(1.0)
 
 
-def test_the_model_can_be_named() -> None:
-    """An option and the capture's flag decide on the camera model."""
-    table = turntable(np.random.default_rng(2), stray=0.0)
-    few = replace(FAST, iterations=2, carries=0)
-    options = replace(few, model="orthographic")
-    scene = estimate_scene(table.capture, table.masks, table.head, None, options)
-    assert scene.cameras[0].model == "orthographic"
-    flagged = replace(table.capture, orthographic=True)
-    scene = estimate_scene(flagged, table.masks, table.head, None, few)
-    assert scene.cameras[0].model == "orthographic"
-
-
 def test_a_known_focal_length_is_kept(bust: Turntable) -> None:
     """Photos that tell their focal length get cameras with it, to a few per cent."""
     views = tuple(replace(view, focal_px=560.0) for view in bust.capture.views)
@@ -242,7 +235,7 @@ def test_a_start_is_searched_from_and_keeps_its_kind(bust: Turntable) -> None:
     """Orthographic cameras stay so, near, and fit no worse, where a search from nothing ends with
     perspective ones."""
     given, few = (bust.capture, bust.masks, bust.head), replace(FAST, iterations=15, carries=0)
-    start = estimate_scene(*given, None, replace(few, model="orthographic"))
+    start = estimate_scene(replace(bust.capture, orthographic=True), *given[1:], None, few)
     again = estimate_scene(*given, start, replace(few, iterations=1))
     assert {camera.model for camera in again.cameras} == {"orthographic"}
     assert start.residual_px is not None
