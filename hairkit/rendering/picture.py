@@ -17,7 +17,7 @@ from hairkit.rendering.framebuffer import average_samples, supersample_camera, t
 from hairkit.rendering.gl_camera import DepthRange
 from hairkit.rendering.hair import RibbonBuffers, draw_ribbons, ribbons
 from hairkit.rendering.head import Solid, bust_solid, head_solid, upload_maps
-from hairkit.rendering.light import Lights, LightVolume, hair_density, light_volume
+from hairkit.rendering.light import FULL_HEAD, Lights, LightVolume, hair_density, light_volume
 from hairkit.rendering.skin_passes import draw_skin
 from hairkit.types.camera import Camera
 from hairkit.types.groom import Groom, HairMaterial
@@ -29,10 +29,9 @@ BACKDROP_TOP, BACKDROP_BOTTOM = (176, 180, 184), (214, 216, 218)
 """sRGB of the neutral backdrop."""
 HEAD_PUSH = 0.0015
 """Meshes are drawn this far behind their surface, metres, so that they do not hide roots."""
-SHOWN_HAIRS = 60_000
-"""Fewer strands are drawn wider, so that they cover the head as this many would."""
-WIDEST = 4.0
-"""Largest factor of that widening."""
+WIDEST = 5.0
+"""Strands fewer than `FULL_HEAD` are drawn wider, so that they hide the scalp as this many would,
+by this factor at most."""
 SAMPLES = 3
 """Along each edge of a pixel: with two, a hair that stands alone is a row of dots."""
 HALF_STEP = 127
@@ -173,7 +172,7 @@ def _resize_camera(camera: Camera, width: int | None, height: int | None) -> Cam
 
 def display_width(strands: Strands, material: HairMaterial) -> float | Float32Array:
     """Return the width, or widths (P,), of strands in pictures, metres."""
-    wider = float(np.clip(SHOWN_HAIRS / max(len(strands), 1), 1.0, WIDEST))
+    wider = float(np.clip(FULL_HEAD / max(len(strands), 1), 1.0, WIDEST))
     return wider * (material.width if strands.widths is None else strands.widths)
 
 
