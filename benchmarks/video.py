@@ -54,11 +54,17 @@ class Lens(NamedTuple):
     """Metres."""
     aim: float
     """Height at which it aims, metres."""
+    tilt: float = 3.0
+    """Mean elevation, degrees."""
 
 
 CROPPED = Lens((810, 1440), 1417.5, 0.756, -0.10)
 MAIN_LENS = Lens((1512, 2016), 1451.52, 0.8, -0.16)
 """Of a phone: 26 mm equivalent."""
+FAR = Lens((1512, 2016), 2903.04, 2.0, -0.16)
+"""The same at twice the zoom, from where a whole person fits into the picture without it."""
+BELOW = FAR._replace(tilt=-12.0)
+"""From there, held at the height of the waist."""
 UNEVEN, TILT, ROLL, NEARER, ASIDE = 8.0, 5.0, 3.0, 0.08, 0.03
 """Greatest drifts: degrees of azimuth, elevation and roll, share of the distance, metres."""
 COLUMNS = ("4/40", "3/30", "2/20", "length", "azimuth off", "red", "amber", "processor s")
@@ -165,7 +171,7 @@ def drifting_cameras(generator: np.random.Generator, lens: Lens | None = None) -
     way = generator.choice([-1, 1])
     azimuth = way * (np.linspace(0, 360, FRAMES, endpoint=False) + drift(UNEVEN))
     azimuth = azimuth + generator.uniform(-30, 30)
-    tilt, roll, nearer, aside = drift(TILT) + 3, drift(ROLL), drift(NEARER), drift(ASIDE)
+    tilt, roll, nearer, aside = drift(TILT) + lens.tilt, drift(ROLL), drift(NEARER), drift(ASIDE)
     return [
         Camera.on_turn(
             azimuth[k],
