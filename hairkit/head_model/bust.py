@@ -8,6 +8,7 @@ not use it.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -72,6 +73,8 @@ def bust_under(head: Head, strands: Strands | None = None) -> Bust | None:
     rings = torso.surface(heights, AROUND)
     middle = rings.mean(axis=1, keepdims=True)
     rings = _lay_collar(rings, middle, heights, neck, torso.scale)
+    vertices, thick = head.vertices.astype(np.float64), CLOTH_THICK * torso.scale
+    rings = middle + _clear_neck(rings, middle, vertices, thick)[..., None] * (rings - middle)
     below = np.clip((ROUND - heights) / (ROUND - FOOT), 0, 1)
     narrowed = np.sqrt(1 - (1 - FLAT**2) * below**2)[:, None, None]
     size = narrowed * _give_way(rings, middle, strands)[..., None]
@@ -146,15 +149,38 @@ def _lay_collar(
     return on_neck + share * (rings - on_neck)
 
 
+def _clear_neck(
+    rings: Float64Array, middle: Float64Array, vertices: Float64Array, off: float
+) -> Float64Array:
+    """Return the size (R, A) of the sections at which a neck's vertices stay `off` metres inside.
+
+    Those above the tilted collar may come out.
+    """
+    ahead = vertices[:, 2] - middle[0, 0, 2]
+    tilted = vertices + np.outer(TILT * ahead, (0, 1, 0))
+    return 1 / _least_ratio(rings, middle, tilted, lambda reach, outline: outline / (reach + off))
+
+
 def _give_way(rings: Float64Array, middle: Float64Array, strands: Strands | None) -> Float64Array:
     """Return the size (R, A) of the sections at which no strand runs inside of them."""
-    size = np.ones(rings.shape[:2])
-    if strands is None or not len(strands):
-        return size
-    level = middle[::-1, 0, 1]
-    points = strands.points[
-        (strands.points[:, 1] > level[0]) & (strands.points[:, 1] < level[-1])
-    ].astype(np.float64)
+    if strands is None:
+        return np.ones(rings.shape[:2])
+    points = strands.points.astype(np.float64)
+    return _least_ratio(rings, middle, points, lambda reach, outline: CLEAR * reach / outline)
+
+
+def _least_ratio(
+    rings: Float64Array,
+    middle: Float64Array,
+    points: Float64Array,
+    ratio: Callable[[Float64Array, Float64Array], Float64Array],
+) -> Float64Array:
+    """Return (R, A) the least ratio that points (N, 3) beside a section ask for, smooth, up to 1.
+
+    `ratio` is given their distances from the axis and those of the section in their directions.
+    """
+    size, level = np.ones(rings.shape[:2]), middle[::-1, 0, 1]
+    points = points[(points[:, 1] > level[0]) & (points[:, 1] < level[-1])]
     ring = np.rint(np.interp(points[:, 1], level, np.arange(len(level))[::-1])).astype(np.int64)
     angle, distance = _polar(points - middle[ring, 0])
     reach_angle, reach = _polar(rings - middle)
@@ -163,7 +189,7 @@ def _give_way(rings: Float64Array, middle: Float64Array, strands: Strands | None
     outline = np.stack(
         [np.interp(even, a, r, period=2 * np.pi) for a, r in zip(reach_angle, reach, strict=True)]
     )
-    np.minimum.at(size, (ring, column), CLEAR * distance / outline[ring, column])
+    np.minimum.at(size, (ring, column), ratio(distance, outline[ring, column]))
     modes = ("nearest", "wrap")
     least = ndimage.minimum_filter(size, 3, mode=modes)
     smooth = np.minimum(ndimage.gaussian_filter(least, GIVE_BLUR, mode=modes), least)

@@ -64,6 +64,20 @@ def test_collar_closes_round_the_neck(name: str) -> None:
     assert body.volume > 0
 
 
+def test_a_neck_that_bends_forwards_stays_inside() -> None:
+    """Below the collar the shirt covers a throat that lies farther forwards than at the collar."""
+    head = default_head()
+    vertices = head.vertices.copy()
+    lower = np.clip((-0.10 - vertices[:, 1]) / 0.06, 0, 1) * (vertices[:, 2] > 0)
+    vertices[:, 2] += np.float32(0.03) * lower
+    bust = bust_under(replace(head, vertices=vertices))
+    assert bust is not None
+    collar, height = bust.vertices[AROUND : 2 * AROUND, 1], vertices[:, 1]
+    covered = (height < collar.min() - 0.004) & (height > height.min() + 0.002)
+    assert covered.sum() > 40
+    assert solid(bust).contains(vertices[covered]).all()
+
+
 def test_hair_lies_outside() -> None:
     """No strand runs inside of the bust, though some run through the torso it is made of."""
     hair, head = hanging(), default_head()
