@@ -31,7 +31,7 @@ KNOWN_TURN = SimpleNamespace(
     ),
 )
 """In the place of `silhouette`, whose search takes longer than all else."""
-SMALL_LENS = SimpleNamespace(size=(180, 320), focal=315.0, distance=0.756, aim=-0.1)
+SMALL_LENS = SimpleNamespace(size=(180, 320), focal=315.0, distance=0.756, aim=-0.1, tilt=3.0)
 SMALL: dict[str, tuple[dict[str, Any], list[str]]] = {
     "analogies": ({"SMALL": 16, "LARGE": 24, "SEEDS": 1, "ROWS": 1}, []),
     "batch": ({"JOBS": 4, "WARM": 2, "WAITING": 2, "WAIT_S": 0.0}, []),
