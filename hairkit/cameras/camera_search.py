@@ -38,7 +38,7 @@ UNEVEN_NOISE, UNEVEN_ROUNDS, UNEVEN_KEPT = 2.0, 6, 3
 on for as many rounds at the noise itself."""
 FAR = 4.0
 """The search also starts from so many times the usual distance: real people who were photographed
-from some metres away ended at 2 to 5 times the cost without, at a wrong height of the camera."""
+from some metres away ended at 4 times the cost without, at a wrong height of the camera."""
 FARTHER, FARTHER_NOISE, MOST_FARTHER = 1.2, (4.0, 2.0), 6
 """Factor by which all distances are tried anew, times the noise of outlines in these rounds, and
 most steps one way. A search ends near the distance from which it starts: of 20 turns without EXIF
