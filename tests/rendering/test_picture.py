@@ -12,7 +12,7 @@ import pytest
 
 from hairkit.colour import srgb_from_linear
 from hairkit.errors import InputError, RenderError
-from hairkit.rendering import Lights, draw, draw_views
+from hairkit.rendering import Lights, display_width, draw, draw_views
 from hairkit.rendering import context as context_module
 from hairkit.rendering.context import BACKENDS, renderer
 from hairkit.rendering.head import SKIN
@@ -45,6 +45,13 @@ def test_fair_hair_is_brighter_than_dark_hair() -> None:
     )
     assert fair.mean() > dark.mean() + 40
     assert red[..., 0].mean() > red[..., 2].mean() + 40
+
+
+@pytest.mark.parametrize(("count", "wider"), [(1_000, 5), (50_000, 2), (200_000, 1)])
+def test_few_strands_are_as_wide_as_a_full_head_of_hair_needs(count: int, wider: float) -> None:
+    """Below a fifth of its 100,000 hairs they become no wider."""
+    strands = Strands(np.zeros((2 * count, 3), np.float32), np.arange(count + 1) * 2)
+    assert display_width(strands, HairMaterial(width=1e-4)) == pytest.approx(wider * 1e-4)
 
 
 def test_views_drawn_together_equal_views_drawn_alone() -> None:

@@ -13,7 +13,7 @@ from hairkit import Camera, Capture, Face, Mask, Scene, View
 from hairkit.cameras import camera_search
 from hairkit.cameras.camera_search import Evidence, Fit, Search
 from hairkit.cameras.turn_fit import TurnFit
-from hairkit.cameras.turntable import LOG_MAGNIFICATION, PER_VIEW, SHARED
+from hairkit.cameras.turntable import LOG_MAGNIFICATION, PER_VIEW, PERSPECTIVE, SHARED
 
 FAST = Options(contour_points=40)
 """Fewer rays along outlines than the default, for half of its time."""
@@ -136,6 +136,32 @@ def test_opposite_views_that_hold_each_other_are_moved(monkeypatch: pytest.Monke
     assert found() == pytest.approx(deep, rel=0.1)
     monkeypatch.setattr(camera_search, "SIDES", 0)
     assert abs(found()) < np.radians(3)
+
+
+def test_the_search_also_starts_from_far_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A shallow valley at 0.7 m and a deep one at 2.8 m: steps of 1.2 lead back into the first."""
+    far, size = np.log(4.0), SHARED + PER_VIEW * 8
+
+    def evidence(fit: Fit, coarseness: float) -> Evidence:
+        """The two valleys along the logarithm of the distance."""
+        along = -np.log(0.7 * fit.vector[PERSPECTIVE])
+        turn = np.pi * along / far
+        misses = np.array([10 * np.sin(turn), 3 * (1 - along / far)])
+        slope = np.array([10 * np.pi * np.cos(turn), -3]) / far
+        rows = np.zeros((2, size))
+        rows[:, PERSPECTIVE] = -slope / fit.vector[PERSPECTIVE]
+        return Evidence(float(misses @ misses), rows.T @ rows, -rows.T @ misses, None)
+
+    def distance() -> float:
+        start = np.zeros(size)
+        start[PERSPECTIVE] = 1 / 0.7
+        search = Search(evidence, np.full(size, 100.0), 20)
+        fit = search.find(Fit(start, np.zeros((68, 3)), False, start), np.arange(8) * np.pi / 4)
+        return float(1 / fit.vector[PERSPECTIVE])
+
+    assert distance() == pytest.approx(2.8, rel=0.05)
+    monkeypatch.setattr(camera_search, "FAR", 1.0)
+    assert distance() < 0.9
 
 
 def test_nothing_is_evaluated_twice(bust: Turntable, monkeypatch: pytest.MonkeyPatch) -> None:
