@@ -88,6 +88,11 @@ def unit_vectors(vectors: npt.NDArray[np.floating[Any]]) -> npt.NDArray[Any]:
     return np.asarray(vectors / np.maximum(length, 1e-9))
 
 
+def across(axes: npt.NDArray[Any], vectors: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return the parts of vectors (..., N) across the unit vectors `axes` (..., N)."""
+    return np.asarray(vectors - (vectors * axes).sum(axis=-1, keepdims=True) * axes)
+
+
 def check_reach(values: npt.NDArray[np.floating[Any]], source: object, name: str) -> None:
     """Raise `FormatError` naming the source where a length or coordinate is beyond `MAX_REACH`."""
     farthest = float(np.abs(values).max(initial=0.0))

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array, unit_vectors
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int32Array, across, unit_vectors
 from hairkit.field.cell_shells import dilate_cells
 from hairkit.field.parting import comb_from_parting, crown_share, root_lift
 from hairkit.field.smooth_volume import smooth_volume
@@ -115,7 +115,7 @@ def _comb(
     hair_length: float,
 ) -> Float64Array:
     """Return the combing direction (N, 3) at points where normals and flow (N, 3) are known."""
-    flow = flow - np.sum(flow * outward, axis=1, keepdims=True) * outward
+    flow = across(outward, flow)
     share = long_share(hair_length)
     combed = share * flow + max(1 - share, LEAST_WHORL) * whorl_direction(head, at, outward)
     combed /= np.maximum(np.linalg.norm(combed, axis=1, keepdims=True), 1e-6)
@@ -191,7 +191,7 @@ def whorl_direction(head: Head, at: Float64Array, outward: Float64Array) -> Floa
     away[:, 1] = 0
     away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-6)
     combed = WHORL_SLOPE * away + [0.0, -1.0, 0.0]
-    combed -= np.sum(combed * outward, axis=1, keepdims=True) * outward
+    combed = across(outward, combed)
     return np.asarray(combed / np.maximum(np.linalg.norm(combed, axis=1, keepdims=True), 1e-6))
 
 

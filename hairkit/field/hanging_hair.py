@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hairkit.arrays import Float32Array, Float64Array, unit_vectors
+from hairkit.arrays import Float32Array, Float64Array, across, unit_vectors
 from hairkit.field.growth_prior import WHORL_BEHIND
 from hairkit.types.head import Head
 from hairkit.types.volume import Hull, OrientationField, ScalpDistance, symmetric_matrices
@@ -82,6 +82,6 @@ def hanging_axes(head: Head, points: Float32Array, height: Float32Array) -> Floa
     top = head.vertices[np.argmax(head.vertices[:, 1])].astype(np.float64)
     away = unit_vectors((at - top + [0, 0, WHORL_BEHIND]) * [1, 0, 1])
     along = AWAY * away + [0.0, -1.0, 0.0]
-    along = unit_vectors(along - np.sum(along * outward, axis=1, keepdims=True) * outward)
+    along = unit_vectors(across(outward, along))
     lift = LIFT * np.clip(1 - height.astype(np.float64) / STANDS_OFF, 0, 1)
     return unit_vectors(along + lift[:, None] * outward)

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from hairkit.arrays import Float64Array, unit_vectors
+from hairkit.arrays import Float64Array, across, unit_vectors
 from hairkit.types.head import Head
 from hairkit.types.parting import Parting
 from hairkit.types.volume import Hull
@@ -86,19 +86,19 @@ def _comb_behind_front(parting: Parting, at: Float64Array, outward: Float64Array
         gap, near = cKDTree(parting.places).query(at, k=min(NEAREST, len(parting.places)))
         weight = np.exp(-0.5 * (gap / BETWEEN) ** 2) + LEAST_WEIGHT
         seen = np.einsum("nk,nki->ni", weight, parting.directions[near])
-        return unit_vectors(_tangent(seen, outward))
+        return unit_vectors(across(outward, seen))
     if parting.line is None:
         return _over_head(outward, 1.0)
     flat, away = at[:, [0, 2]], np.zeros_like(at)
     away[:, [0, 2]] = flat - _nearest_on(parting.line, flat)
     back = np.clip(SWEEP + SWEEP_SLOPE * (SWEEP_AT - at[:, 2]), -MOST_SWEEP, MOST_SWEEP)
     pull = DOWN * np.array([0.0, -1.0, 0.0]) + back[:, None] * np.array([0.0, 0.0, -1.0])
-    return unit_vectors(unit_vectors(_tangent(away, outward)) + _tangent(pull, outward))
+    return unit_vectors(unit_vectors(across(outward, away)) + across(outward, pull))
 
 
 def _over_head(outward: Float64Array, back: float) -> Float64Array:
     """Return unit tangents (N, 3) over the head from the face to the nape, or for -1 against it."""
-    return unit_vectors(_tangent(back * np.cross(outward, [1.0, 0.0, 0.0]) + DROP, outward))
+    return unit_vectors(across(outward, back * np.cross(outward, [1.0, 0.0, 0.0]) + DROP))
 
 
 def _nearest_on(line: Float64Array, at: Float64Array) -> Float64Array:
@@ -123,7 +123,3 @@ def root_lift(hull: Hull, points: npt.ArrayLike) -> Float64Array:
     distance = hull.grid.sample(hull.head_distance, points).astype(np.float64)
     over = np.clip(thickness[cell[:, 0], cell[:, 2]], THINNEST, THICKEST)
     return np.asarray(np.clip(1 - distance / over, 0.0, 1.0))
-
-
-def _tangent(vector: Float64Array, outward: Float64Array) -> Float64Array:
-    return np.asarray(vector - np.einsum("ij,ij->i", vector, outward)[:, None] * outward)

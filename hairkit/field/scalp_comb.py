@@ -16,7 +16,7 @@ import numpy as np
 from scipy import sparse
 from scipy.spatial import cKDTree
 
-from hairkit.arrays import Float32Array, Float64Array
+from hairkit.arrays import Float32Array, Float64Array, across, unit_vectors
 from hairkit.field.growth_prior import gradient
 from hairkit.field.parting import FRONT_FADE, comb_from_parting, front_share
 from hairkit.field.relaxed_signs import relaxed_signs
@@ -66,14 +66,14 @@ def see_front(
     sight: ScalpSight, masks: Sequence[Mask], cameras: Sequence[Camera], head: Head
 ) -> Front:
     """Return how the hair above the forehead crosses the hairline."""
-    across = _across_hairline(sight, head)
-    if across < LEAST_ACROSS:
+    agreement = _across_hairline(sight, head)
+    if agreement < LEAST_ACROSS:
         return Front(0.0, 0.0)
     covered = forehead_covered(masks, cameras, head)
     if MOST_BARE < covered < LEAST_COVERED:
         return Front(0.0, 0.0)
     way = 1.0 if covered >= LEAST_COVERED else -1.0
-    return Front(way, _share(across, LEAST_ACROSS, FULL_ACROSS))
+    return Front(way, _share(agreement, LEAST_ACROSS, FULL_ACROSS))
 
 
 def comb_beside_parting(skin: Parting, front: Front) -> Parting:
@@ -105,8 +105,9 @@ def comb_scalp(
     order = (value[:, 2] - value[:, 1]).sum() / max(float(value.sum()), 1e-9)
     if order < LEAST_ORDER:
         return skin
-    towards = _tangent(gradient(hull.grid, growth, places), normals)
-    main = np.where(value[:, 2:] > 0, _tangent(vector[:, :, 2], normals), towards)
+    towards = unit_vectors(across(normals, gradient(hull.grid, growth, places)))
+    seen = unit_vectors(across(normals, vector[:, :, 2]))
+    main = np.where(value[:, 2:] > 0, seen, towards)
     if front.forward:
         share = front_share(head, places)[:, None]
         ahead = comb_from_parting(Parting(fringe=True), head, places, normals)
@@ -134,12 +135,6 @@ def _neighbours(at: Float64Array, of: Float64Array, blur: float) -> sparse.csr_m
     near = cKDTree(at).sparse_distance_matrix(cKDTree(of), reach, output_type="coo_matrix").tocsr()
     near.data = np.exp(-0.5 * (near.data / blur) ** 2)
     return near
-
-
-def _tangent(vectors: Float64Array, normals: Float64Array) -> Float64Array:
-    """Return the unit tangential parts of vectors (N, 3)."""
-    flat = vectors - (vectors * normals).sum(axis=1, keepdims=True) * normals
-    return np.asarray(flat / np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-9))
 
 
 def _across_hairline(sight: ScalpSight, head: Head) -> float:

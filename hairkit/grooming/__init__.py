@@ -20,6 +20,7 @@ Make a groom of tracked or imported strands, thin it out or fill it up, and prep
 * `photo_colours`: colours of hair from the photos, of dyed streaks and tips too
 * `postprocess`: ties, waves and head collision after tracking
 * `prepare_export`: choice of strands and defaults for exporters
+* `smooth_curves`: curves without sudden bends
 * `target_rules`: what engines demand of a hair file
 * `wind_waves`: measured waves put onto strands
 * `wrap`: a groom carried to another head

@@ -25,6 +25,7 @@ from hairkit.grooming.locks import (
     turn_about,
     wander,
 )
+from hairkit.grooming.smooth_curves import smooth_curves
 from hairkit.head_model.scalp import roots_at, sample_roots
 from hairkit.types.groom import Groom, HairMaterial
 from hairkit.types.head import Roots
@@ -137,7 +138,7 @@ class _Bundle:
         m = int(even.counts[0])
         points = even.points.reshape(-1, m, 3)
         shape = points - points[:, :1]
-        course = np.einsum("ij,sjk->sik", _smoothing(m), shape, optimize=True)
+        course = smooth_curves(shape, COURSE_SIGMA)
         roots = points[:, 0].copy()
         return cls(roots, course, shape - course, even.lengths(), cKDTree(roots))
 
@@ -153,27 +154,6 @@ class _Mix:
         for k in range(self.guides.shape[1]):
             mixed += self.weights[:, k, None, None] * values[self.guides[:, k]]
         return mixed
-
-
-def _smoothing(m: int) -> Float32Array:
-    """Return the (m, m) Gaussian smoothing that keeps both ends by mirroring through them."""
-    sigma = COURSE_SIGMA * (m - 1)
-    reach = int(np.ceil(3 * sigma))
-    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / max(sigma, 1e-9)) ** 2)
-    kernel /= kernel.sum()
-    matrix = np.zeros((m, m))
-    rows = np.arange(m)
-    for offset, weight in zip(range(-reach, reach + 1), kernel, strict=True):
-        column = rows + offset
-        low, high = column < 0, column >= m
-        mirrored = np.clip(
-            np.where(low, -column, np.where(high, 2 * (m - 1) - column, column)), 0, m - 1
-        )
-        sign = np.where(low | high, -1.0, 1.0)
-        np.add.at(matrix, (rows, mirrored), weight * sign)
-        np.add.at(matrix, (rows[low], np.zeros(low.sum(), int)), 2 * weight)
-        np.add.at(matrix, (rows[high], np.full(high.sum(), m - 1)), 2 * weight)
-    return matrix.astype(np.float32)
 
 
 def _new_roots(

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from hairkit.arrays import Float64Array, Int64Array, unit_vectors
+from hairkit.arrays import Float64Array, Int64Array, across, unit_vectors
 from hairkit.grooming.brushed_hair import MIRROR, Hair, Stroke
 from hairkit.grooming.densify import NEIGHBOURS, densify
 from hairkit.head_model.scalp import evaluate, even_places, face_areas, roots_at
@@ -139,7 +139,7 @@ def _grown(others: Hair, stroke: Stroke, roots: Roots) -> Float64Array:
     if len(stroke.path) > 1:
         drawn = np.gradient(stroke.path, axis=0)[stroke.reach(start)[1]]
         way = usual.follow * unit_vectors(drawn) + (1 - usual.follow) * unit_vectors(way)
-    along = unit_vectors(way - (way * normal).sum(axis=1, keepdims=True) * normal)
+    along = unit_vectors(across(normal, way))
     lift = np.radians(np.linspace(*usual.lift_deg, many - 1))[:, None]
     turned = np.cos(lift) * along[:, None] + np.sin(lift) * normal[:, None]
     length = usual.length * (1 - SHORTER * np.modf(GOLDEN * np.arange(len(roots)))[0])

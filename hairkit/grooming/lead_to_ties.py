@@ -14,7 +14,7 @@ import numpy as np
 from scipy import ndimage
 from scipy.spatial import cKDTree
 
-from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array, unit_vectors
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array, across, unit_vectors
 from hairkit.field.growth_prior import gradient
 from hairkit.grooming.fringe import hang_fringe
 from hairkit.types.strands import Strands
@@ -115,9 +115,9 @@ def _ways_to_tie(
             break
         p = at[going]
         outward = _outward(hull, p)
-        goal = unit_vectors(_tangent(ring - p, outward))
+        goal = unit_vectors(across(outward, ring - p))
         around = symmetric_matrices(hull.grid.sample(tensors, p + SKIN * outward))
-        measured = unit_vectors(_tangent(np.einsum("nij,nj->ni", around, goal), outward))
+        measured = unit_vectors(across(outward, np.einsum("nij,nj->ni", around, goal)))
         wanted = unit_vectors(goal + TRUST * (measured - goal))
         heading[going] = unit_vectors(heading[going] + wanted)
         p = p + STEP * heading[going]
@@ -221,10 +221,6 @@ def _join(way: Float64Array, hanging: Float64Array) -> Float64Array:
 
 def _outward(hull: Hull, points: Float64Array) -> Float64Array:
     return gradient(hull.grid, hull.head_distance, points)
-
-
-def _tangent(vector: Float64Array, outward: Float64Array) -> Float64Array:
-    return np.asarray(vector - np.einsum("ij,ij->i", vector, outward)[:, None] * outward)
 
 
 def plait(u: float, v: float, tail: Tail) -> Float64Array:

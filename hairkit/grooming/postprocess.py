@@ -1,4 +1,4 @@
-"""Last steps of every tracker: lead the strands to their tie, wave, push them outside."""
+"""Last steps of trackers: lead the strands to their tie, straighten, wave, push them outside."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import ndimage
 
-from hairkit.arrays import Float32Array, Float64Array
+from hairkit.arrays import Float32Array, across, unit_vectors
 from hairkit.grooming.head_collision import push_out_of_head
 from hairkit.grooming.lead_to_ties import lead_to_ties
+from hairkit.grooming.smooth_curves import smooth_curves
 from hairkit.grooming.wind_waves import LARGEST_RADIUS, add_waves, grown_share
 from hairkit.options import option
 from hairkit.types.strands import Strands
@@ -24,6 +25,9 @@ class FinishOptions:
 
     clearance: float = option(0.001, low=0, high=0.02, unit="m", doc="Distance kept from the head.")
     waves: bool = option(True, doc="Wind the strands into the waves measured in the photos.")
+    stiffness: float = option(
+        0.006, low=0, high=0.1, unit="m", doc="Deviation of the smoothing along strands; 0: none."
+    )
     points: int = option(64, low=2, high=255, doc="Points of every strand; equal segments.")
 
 
@@ -33,6 +37,8 @@ DEPTH_BLUR = 1.0
 """Standard deviation in cells that makes the depth under the hull's surface smooth."""
 PATH_BLUR = 1.5
 """Standard deviation in points, along a strand, that keeps its axis smooth."""
+STIFF_SHARE = 0.05
+"""Standard deviation of the smoothing along a strand, in shares of its length at most."""
 
 
 def finish(
@@ -43,14 +49,26 @@ def finish(
     field: OrientationField,
     options: FinishOptions,
 ) -> Strands:
-    """Lead strands to their ties, wave them if the options ask for it, push them out of the head.
-
-    `options.points` is used by the tracker.
-    """
-    strands = lead_to_ties(strands, tied, hull, field)
+    """Lead strands to their ties, straighten, wave them as the options ask, push them outside."""
+    strands = _straighten(lead_to_ties(strands, tied, hull, field), tied, options.stiffness)
     if options.waves:
         strands = add_waves(make_room(strands, waves, hull), waves)
     return push_out_of_head(strands, hull.grid, hull.head_distance, options.clearance)
+
+
+def _straighten(strands: Strands, tied: TiedHair, stiffness: float) -> Strands:
+    """Return strands of equal point counts without sudden bends; braids stay as they are.
+
+    Growth bends at once where it meets a surface or a tie, stiff hair over some millimetres.
+    """
+    if not len(strands) or not stiffness:
+        return strands
+    sigma = np.minimum(stiffness / np.maximum(strands.lengths(), 1e-9), STIFF_SHARE)
+    if strands.group is not None:
+        plaited = np.array([False, *(tail.crossing > 0 for tail in tied.tails)])
+        sigma[plaited[strands.group]] = 0
+    points = smooth_curves(strands.points.reshape(len(strands), -1, 3), sigma)
+    return replace(strands, points=points.reshape(-1, 3))
 
 
 def make_room(strands: Strands, waves: Waves, hull: Hull) -> Strands:
@@ -64,8 +82,7 @@ def make_room(strands: Strands, waves: Waves, hull: Hull) -> Strands:
     if waves.radius <= 0 or len(strands) == 0:
         return strands
     depth = _depth(hull)
-    slope = cell_slopes(depth)
-    slope /= np.maximum(np.linalg.norm(slope, axis=3, keepdims=True), 1e-9)
+    slope = unit_vectors(cell_slopes(depth))
     known = np.concatenate([slope, depth[..., None], hull.head_distance[..., None]], axis=3)
     points = strands.points.reshape(len(strands), -1, 3)
     arc = strands.arc_lengths().reshape(len(strands), -1)
@@ -75,18 +92,12 @@ def make_room(strands: Strands, waves: Waves, hull: Hull) -> Strands:
         here, over_head = found[..., 3], np.maximum(found[..., 4], 0)
         middle = np.maximum(here + over_head, 0) / 2
         lacking = np.clip(np.minimum(wanted, middle) - here, 0, None)
-        move = _across(points, found[..., :3] * lacking[..., None])
+        along = unit_vectors(np.asarray(np.gradient(points, axis=1)))
+        move = across(along, found[..., :3] * lacking[..., None])
         move = ndimage.gaussian_filter1d(move, PATH_BLUR, axis=1, mode="nearest")
         move[:, 0] = 0
         points = points + (SHARE * move).astype(np.float32)
     return replace(strands, points=np.ascontiguousarray(points.reshape(-1, 3)))
-
-
-def _across(points: Float32Array, move: Float32Array | Float64Array) -> Float64Array:
-    """Return the part of moves (S, M, 3) across the strands (S, M, 3): none is shortened."""
-    tangent = np.gradient(points.astype(np.float64), axis=1)
-    tangent /= np.maximum(np.linalg.norm(tangent, axis=2, keepdims=True), 1e-12)
-    return np.asarray(move - (move * tangent).sum(axis=2, keepdims=True) * tangent)
 
 
 def _depth(hull: Hull) -> Float32Array:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hairkit.arrays import Float32Array, Float64Array
+from hairkit.arrays import Float32Array, Float64Array, across
 from hairkit.types.strands import Strands
 from hairkit.types.waves import Waves
 
@@ -75,7 +75,7 @@ def _transport_frames(points: Float64Array) -> tuple[Float64Array, Float64Array]
         tangent[:, 0], [1.0, 0.0, 0.0]
     )
     for k in range(points.shape[1]):
-        side = side - np.sum(side * tangent[:, k], axis=1, keepdims=True) * tangent[:, k]
+        side = across(tangent[:, k], side)
         side = side / np.maximum(np.linalg.norm(side, axis=1, keepdims=True), 1e-12)
         normal[:, k] = side
     return normal, np.cross(tangent, normal)

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from hairkit.arrays import BoolArray, Float32Array, Int64Array
+from hairkit.arrays import BoolArray, Float32Array, Int64Array, across
 from hairkit.errors import InputError
 from hairkit.head_model.scalp import sample_roots
 from hairkit.synth.bust import Bust, Obstacle
@@ -200,7 +200,7 @@ def _start_directions(
         drop, back = np.full_like(side, -PARTING_DROP), np.full_like(side, -PARTING_BACK)
         parted = np.stack([side, drop, back], axis=1)
         away = (1 - behind[:, None]) * parted + behind[:, None] * _unit(away)
-    along = away - (away * roots.normals).sum(axis=1, keepdims=True) * roots.normals
+    along = across(roots.normals, away)
     jitter = COMB_JITTER * generator.standard_normal((len(roots), 3))
     return _unit(look.lift * roots.normals + _unit(along) + jitter)
 
@@ -303,8 +303,7 @@ def _frames(paths: Float32Array) -> tuple[Float32Array, Float32Array]:
     tangent = _unit(np.gradient(paths, axis=1))
     outward = paths.mean(axis=1, keepdims=True) * _LEVEL
     sideways = np.cross(np.broadcast_to(-_DOWN, outward.shape), outward)
-    across = sideways - (sideways * tangent).sum(axis=2, keepdims=True) * tangent
-    first = _unit(across)
+    first = _unit(across(tangent, sideways))
     return first, np.cross(tangent, first).astype(np.float32)
 
 

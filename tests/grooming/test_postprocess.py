@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from hairkit.arrays import unit_vectors
 from hairkit.grooming.head_collision import FULL_AFTER
 from hairkit.grooming.postprocess import FinishOptions, finish
 from hairkit.testing import ball_head, combed_field, scalp_roots, shell_hull
@@ -43,3 +44,29 @@ def test_wound_strands_keep_the_clearance_too() -> None:
     assert result.lengths().mean() > 1.2 * strands.lengths().mean()
     grown = result.points[result.arc_lengths() > 2 * FULL_AFTER]
     assert hull.grid.sample(hull.head_distance, grown).min() > 0.003 - 1e-4
+
+
+def elbows() -> Strands:
+    """Four strands, 4 cm out of the ball and then 4 cm along it, with a right angle between."""
+    t = np.linspace(-1, 1, 41)[:, None]
+    way = np.minimum(t, 0) * [0, -0.04, 0] + np.maximum(t, 0) * [0.04, 0, 0] + [0.0, 0.24, 0.0]
+    return Strands(np.tile(way, (4, 1)).astype(np.float32), np.arange(5) * 41)
+
+
+def sharpest(strands: Strands) -> np.ndarray:
+    """Largest angle (S,) between the segments of each strand, degrees."""
+    along = unit_vectors(np.diff(strands.points.reshape(len(strands), -1, 3), axis=1))
+    cosine = np.einsum("smc,smc->sm", along[:, 1:], along[:, :-1])
+    return np.degrees(np.arccos(np.clip(cosine.min(axis=1), -1, 1)))
+
+
+def test_stiff_strands_bend_over_some_millimetres() -> None:
+    """A right angle becomes an arc, roots and tips stay."""
+    strands = elbows()
+    result = finish(strands, Waves(), TiedHair(), shell_hull(), FIELD, PLAIN)
+    assert sharpest(strands).min() > 85
+    assert sharpest(result).max() < 25
+    np.testing.assert_allclose(result.roots, strands.roots, atol=1e-6)
+    np.testing.assert_allclose(result.tips, strands.tips, atol=1e-6)
+    limp = finish(strands, Waves(), TiedHair(), shell_hull(), FIELD, replace(PLAIN, stiffness=0.0))
+    np.testing.assert_array_equal(limp.points, strands.points)
