@@ -57,7 +57,7 @@ FIRST_PEAK = 0.6
 LEAST_PROMINENCE = 0.08
 """Of a peak over the trough before it, relative to the smallest lag: straight hair has up to 0.03,
 wavy and curly hair 0.24 to 0.31."""
-SLOPE_PATCH, SLOPE_STEP = (0.048, 0.048), 0.012
+SLOPE_PATCH, SLOPE_STEP = (0.036, 0.036), 0.012
 """Height, width and spacing of the patches, wholly hair, for the spectrum, metres."""
 BAND = (150.0, 350.0)
 """Cycles per metre: 3 to 7 mm, coarser than the lattice of pixels, finer than locks."""
@@ -92,6 +92,9 @@ MOMENT_ERROR, MODEL_ERROR = 0.012, 0.1
 """Statistical error of a moment over eight views, and relative error of the model."""
 LEAST_SLOPE = 0.4
 """Slope of the slightest waves."""
+USUAL_RADIUS, LEAST_UNSEEN = 0.0055, 0.1
+"""Metres: of waves of one or two photos whose pitch is not seen, beside a face (those of three
+captures have 6.2 to 6.9 mm), and the least length of such hair: short hair is often uneven."""
 SURE_SLANT = 2.5
 """Standard errors by which the views' mean slant must differ from 0."""
 _SLOPES = np.linspace(0.02, 4.0, 200)
@@ -119,27 +122,30 @@ def measure_waves(
         for view, mask, camera in zip(capture.views, masks, cameras, strict=True)
     ]
     views = [_normalise(*view) for view in scaled if view is not None]
-    if _are_coils(views):
-        return COILS
     fewest = min(FEWEST_PATCHES, FEWEST_EACH * len(cameras))
+    if _are_coils(views, fewest):
+        return COILS
     pitch, prominence = _measure_pitch(views, fewest)
-    moments = _angular_moments(views, fewest) if prominence >= LEAST_PROMINENCE else None
+    seen = prominence >= LEAST_PROMINENCE
+    moments = _angular_moments(views, fewest) if seen or fewest < FEWEST_PATCHES else None
     slope = 0.0 if moments is None else _fit_slope(*moments)
+    pitch = pitch if seen else 2 * np.pi * USUAL_RADIUS / max(slope, LEAST_SLOPE)
     radius = slope * pitch / (2 * np.pi)
-    short = scalp_distance is not None and scalp_distance.hair_length < LEAST_TURNS * pitch
+    least = LEAST_TURNS * pitch if seen else max(LEAST_TURNS * pitch, LEAST_UNSEEN)
+    short = scalp_distance is not None and scalp_distance.hair_length < least
     if slope < LEAST_SLOPE or radius > WIDEST or short:
         return Waves()
     return Waves(radius, pitch, _measure_slant(orientations, masks))
 
 
-def _are_coils(views: Sequence[tuple[Float32Array, Float32Array]]) -> bool:
+def _are_coils(views: Sequence[tuple[Float32Array, Float32Array]], fewest: int) -> bool:
     """Return whether hair runs in all directions alike, and repeats nowhere: coils too tight to be
     seen one by one."""
     told = [found for view in views if (found := _angular_moments([view])) is not None]
     even = [max(abs(second), abs(fourth)) <= EVEN for second, fourth in told]
     if len(told) < len(views) / 2 or sum(even) <= LEAST_AGREEMENT * len(told):
         return False
-    if _autocorrelation(_together([_sum_patches(view) for view in views]), FEWEST_PATCHES) is None:
+    if _autocorrelation(_together([_sum_patches(view) for view in views]), fewest) is None:
         return False
     pitch, prominence = _measure_pitch(views)
     return prominence < SURE_PROMINENCE or pitch > WIDEST_CURL

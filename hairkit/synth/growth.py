@@ -9,10 +9,9 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from hairkit.arrays import BoolArray, Float32Array, Int64Array, across
+from hairkit.arrays import BoolArray, Float32Array, Int64Array, across, unit_vectors
 from hairkit.errors import InputError
 from hairkit.head_model.scalp import sample_roots
 from hairkit.synth.bust import Bust, Obstacle
@@ -199,10 +198,10 @@ def _start_directions(
         behind = np.clip(-roots.positions[:, 2] / PARTING_REACH, 0, 1)
         drop, back = np.full_like(side, -PARTING_DROP), np.full_like(side, -PARTING_BACK)
         parted = np.stack([side, drop, back], axis=1)
-        away = (1 - behind[:, None]) * parted + behind[:, None] * _unit(away)
+        away = (1 - behind[:, None]) * parted + behind[:, None] * unit_vectors(away)
     along = across(roots.normals, away)
     jitter = COMB_JITTER * generator.standard_normal((len(roots), 3))
-    return _unit(look.lift * roots.normals + _unit(along) + jitter)
+    return unit_vectors(look.lift * roots.normals + unit_vectors(along) + jitter)
 
 
 def _grow_paths(
@@ -228,12 +227,12 @@ def _grow_paths(
     for i in range(1, m):
         arc = step * i
         pull = _DOWN + START_PULL * np.exp(-arc / COMB_REACH) * start
-        direction = _unit(direction + step / look.bend * pull)
+        direction = unit_vectors(direction + step / look.bend * pull)
         ahead = paths[:, i - 1] + step * direction
         distance, outward = obstacle.at(ahead.astype(np.float32))
         wanted = np.maximum(layer * np.minimum(arc / ROOT_REACH, 1), SKIN_GAP)
         ahead = ahead + np.clip(wanted - distance, 0, step) * outward
-        direction = _unit(ahead - paths[:, i - 1])
+        direction = unit_vectors(ahead - paths[:, i - 1])
         paths[:, i] = paths[:, i - 1] + step * direction
     return paths
 
@@ -300,10 +299,10 @@ def _wind_waves(
 
 def _frames(paths: Float32Array) -> tuple[Float32Array, Float32Array]:
     """Return two (N, m, 3) unit vectors across each path, the first level and along the head."""
-    tangent = _unit(np.gradient(paths, axis=1))
+    tangent = unit_vectors(np.gradient(paths, axis=1))
     outward = paths.mean(axis=1, keepdims=True) * _LEVEL
     sideways = np.cross(np.broadcast_to(-_DOWN, outward.shape), outward)
-    first = _unit(across(tangent, sideways))
+    first = unit_vectors(across(tangent, sideways))
     return first, np.cross(tangent, first).astype(np.float32)
 
 
@@ -332,8 +331,3 @@ def _material(look: Style) -> HairMaterial:
     root = np.array(look.colour)
     tip = np.minimum(root * TIP_LIGHTNESS, 1)
     return HairMaterial(root, tip, curl_radius=look.wave_radius, curl_pitch=look.wave_pitch)
-
-
-def _unit(vectors: npt.NDArray[np.floating]) -> Float32Array:
-    length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.asarray(vectors / np.maximum(length, 1e-9), np.float32)

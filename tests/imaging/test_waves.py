@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from hairkit.arrays import Float64Array
 from hairkit.grooming.wind_waves import add_waves
-from hairkit.imaging.waves import COILS, measure_waves, remove_slant
+from hairkit.imaging.waves import COILS, USUAL_RADIUS, measure_waves, remove_slant
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture, View
 from hairkit.types.mask import HAIR, Mask
@@ -109,6 +109,28 @@ def test_views_that_do_not_agree_show_no_waves() -> None:
     assert measure_waves(Capture(tuple(photos)), maps, masks, cameras) == Waves()
     same = Capture((photos[0], photos[0], photos[2], photos[0]))
     assert measure_waves(same, maps, masks, cameras).pitch == pytest.approx(0.027, rel=0.1)
+
+
+def curtains(view: View) -> tuple[Capture, list[OrientationMap], list[Mask], list[Camera]]:
+    """Return one photo of which only two strips are hair, as beside a face."""
+    labels = np.zeros(view.image.shape[:2], np.uint8)
+    for left in (0.01, 0.13):
+        labels[:, round(left * PIXELS_PER_METRE) : round((left + 0.05) * PIXELS_PER_METRE)] = HAIR
+    capture, maps, _, cameras = views_of(view)
+    return replace(capture, views=capture.views[:1]), maps[:1], [Mask(labels, True)], cameras[:1]
+
+
+@pytest.mark.parametrize(("radius", "pitch"), [(0.0065, 0.06), (0.006, 0.05)])
+def test_curtains_of_one_photo_are_as_wavy_as_their_slope_says(radius: float, pitch: float) -> None:
+    """No patch for the pitch fits in: radius and pitch are usual ones of the measured slope."""
+    waves = measure_waves(*curtains(drawing(radius, pitch)))
+    assert waves.radius == pytest.approx(USUAL_RADIUS)
+    assert waves.radius / waves.pitch == pytest.approx(radius / pitch, rel=0.5)
+
+
+def test_straight_curtains_of_one_photo_have_no_waves() -> None:
+    """Their slope is that of straight hair."""
+    assert measure_waves(*curtains(drawing(0.0, 0.05))) == Waves()
 
 
 def test_hair_shorter_than_two_turns_has_no_waves() -> None:
