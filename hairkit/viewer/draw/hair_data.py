@@ -120,10 +120,10 @@ def choose_shares(guides: Strands) -> Float64Array:
     """Return the fewest sample positions (m,) that keep the guides' shape within `TOLERANCE`."""
     some = guides.select(np.arange(0, len(guides), max(1, len(guides) // 100)))
     for count in COUNTS:
-        tried = [np.linspace(0, 1, count) ** power for power in POWERS]
-        misfits = [_misfit(some, shares) for shares in tried]
-        if min(misfits) < TOLERANCE:
-            return tried[int(np.argmin(misfits))]
+        for power in POWERS:
+            shares = np.linspace(0, 1, count) ** power
+            if _misfit(some, shares) < TOLERANCE:
+                return shares
     return np.linspace(0, 1, MOST_POINTS)
 
 
