@@ -115,7 +115,7 @@ def measure_waves(
     The cameras see the head at the origin; orientations, masks and cameras are in the capture's
     order. Hair shorter than two turns, by `scalp_distance`, has no waves, and neither has hair
     whose views show different pitches: what repeats in its pictures is something else, such as the
-    shading of a cut.
+    shading of a cut. Of one or two views that show no pitch, the slope and `USUAL_RADIUS` give it.
     """
     scaled = [
         _scale(view, mask, camera)
@@ -128,7 +128,7 @@ def measure_waves(
     pitch, prominence = _measure_pitch(views, fewest)
     seen = prominence >= LEAST_PROMINENCE
     moments = _angular_moments(views, fewest) if seen or fewest < FEWEST_PATCHES else None
-    slope = 0.0 if moments is None else _fit_slope(*moments)
+    slope = _fit_slope(*moments) if moments and (seen or not _is_even(moments)) else 0.0
     pitch = pitch if seen else 2 * np.pi * USUAL_RADIUS / max(slope, LEAST_SLOPE)
     radius = slope * pitch / (2 * np.pi)
     least = LEAST_TURNS * pitch if seen else max(LEAST_TURNS * pitch, LEAST_UNSEEN)
@@ -142,13 +142,18 @@ def _are_coils(views: Sequence[tuple[Float32Array, Float32Array]], fewest: int) 
     """Return whether hair runs in all directions alike, and repeats nowhere: coils too tight to be
     seen one by one."""
     told = [found for view in views if (found := _angular_moments([view])) is not None]
-    even = [max(abs(second), abs(fourth)) <= EVEN for second, fourth in told]
+    even = [_is_even(moments) for moments in told]
     if len(told) < len(views) / 2 or sum(even) <= LEAST_AGREEMENT * len(told):
         return False
     if _autocorrelation(_together([_sum_patches(view) for view in views]), fewest) is None:
         return False
     pitch, prominence = _measure_pitch(views)
     return prominence < SURE_PROMINENCE or pitch > WIDEST_CURL
+
+
+def _is_even(moments: tuple[float, float]) -> bool:
+    """Return whether lines run in all directions alike, as those of coils and of noise do."""
+    return max(map(abs, moments)) <= EVEN
 
 
 def _measure_slant(orientations: Sequence[OrientationMap], masks: Sequence[Mask]) -> float:

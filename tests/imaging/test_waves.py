@@ -133,6 +133,23 @@ def test_straight_curtains_of_one_photo_have_no_waves() -> None:
     assert measure_waves(*curtains(drawing(0.0, 0.05))) == Waves()
 
 
+@pytest.mark.parametrize("blur", [0.0, 1.5])
+def test_noise_in_the_curtains_of_one_photo_is_no_wave(blur: float) -> None:
+    """It runs in all directions alike, fine or coarse; too little hair shows to call it coils."""
+    view = drawing(0.0, 0.05)
+    noise = np.random.default_rng(0).integers(0, 255, view.image.shape, np.uint8)
+    image = cv2.GaussianBlur(noise, (0, 0), blur) if blur else noise
+    assert measure_waves(*curtains(replace(view, image=np.asarray(image, np.uint8)))) == Waves()
+
+
+def test_short_curtains_of_one_photo_have_no_waves() -> None:
+    """Hair of 9 cm is too short to be waved without a pitch, that of 15 cm is not."""
+    views = curtains(drawing(0.0065, 0.04))
+    least = np.zeros((1, 1, 1), np.float32)
+    assert measure_waves(*views, ScalpDistance(least, 0.09)) == Waves()
+    assert measure_waves(*views, ScalpDistance(least, 0.15)).radius > 0
+
+
 def test_hair_shorter_than_two_turns_has_no_waves() -> None:
     """What repeats every 27 mm in the picture of hair of 40 mm is no wave of it."""
     views = views_of(drawing(0.0068, 0.027))
