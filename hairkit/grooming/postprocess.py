@@ -1,4 +1,4 @@
-"""Last steps of trackers: lead the strands to their tie, straighten, wave, push them outside."""
+"""Last steps of trackers: lead the strands to their tie, smooth, wave, push them outside."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class FinishOptions:
     clearance: float = option(0.001, low=0, high=0.02, unit="m", doc="Distance kept from the head.")
     waves: bool = option(True, doc="Wind the strands into the waves measured in the photos.")
     stiffness: float = option(
-        0.006, low=0, high=0.1, unit="m", doc="Deviation of the smoothing along strands; 0: none."
+        0.006, low=0, high=0.1, unit="m", doc="Sigma of the smoothing along strands; 0: none."
     )
     points: int = option(64, low=2, high=255, doc="Points of every strand; equal segments.")
 
@@ -49,14 +49,14 @@ def finish(
     field: OrientationField,
     options: FinishOptions,
 ) -> Strands:
-    """Lead strands to their ties, straighten, wave them as the options ask, push them outside."""
-    strands = _straighten(lead_to_ties(strands, tied, hull, field), tied, options.stiffness)
+    """Lead strands to their ties, smooth and wave them as the options ask, push them outside."""
+    strands = _smooth(lead_to_ties(strands, tied, hull, field), tied, options.stiffness)
     if options.waves:
         strands = add_waves(make_room(strands, waves, hull), waves)
     return push_out_of_head(strands, hull.grid, hull.head_distance, options.clearance)
 
 
-def _straighten(strands: Strands, tied: TiedHair, stiffness: float) -> Strands:
+def _smooth(strands: Strands, tied: TiedHair, stiffness: float) -> Strands:
     """Return strands of equal point counts without sudden bends; braids stay as they are.
 
     Growth bends at once where it meets a surface or a tie, stiff hair over some millimetres.

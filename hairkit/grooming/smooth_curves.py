@@ -11,8 +11,9 @@ from hairkit.arrays import Float32Array
 def smooth_curves(points: Float32Array, sigma: npt.ArrayLike) -> Float32Array:
     """Return curves (S, m, 3) under a Gaussian of `sigma`, (S,) or one, in shares of their length.
 
-    Points are taken to be evenly spaced. Each curve goes on beyond an end as the same curve turned
-    half about it, so ends stay and straight curves, too: the way off the chord is a sum of sines.
+    Points are taken to be evenly spaced. Beyond each end a curve is continued by its own image,
+    turned by half a turn about that end. So ends and straight curves stay, and the offset from the
+    chord is a sum of sines, each of which the Gaussian scales.
     """
     count = points.shape[1]
     t = np.linspace(0, 1, count, dtype=np.float32)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array, across
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array, across, unit_vectors
 from hairkit.synth.bust import Obstacle
 from hairkit.types.head import Head, Roots
 from hairkit.types.strands import Strands
@@ -95,9 +95,7 @@ def _to_tie(
         if not going.any():
             break
         distance, outward = (v[going].astype(np.float64) for v in obstacle.at(at.astype("f4")))
-        way = centre - at[going]
-        way = across(outward, way)
-        way /= np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
+        way = unit_vectors(across(outward, centre - at[going]))
         layer = TIGHTNESS * np.clip(1 - left[going] / whole[going], THINNEST, 1)[:, None]
         at[going] += STEP * way + np.clip(layer - distance, -STEP / 2, STEP / 2) * outward
         ways[going, step] = at[going]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array, unit_vectors
+from hairkit.arrays import Float32Array, Float64Array, Int32Array, Int64Array, across, unit_vectors
 from hairkit.types.strands import Strands
 
 SPREAD = 2.2
@@ -74,8 +74,7 @@ def make_cards(strands: Strands, lock: Int64Array, stations: int, middle: Float6
     count = np.diff([*first, len(some)])
     centre = np.add.reduceat(points, first) / count[:, None, None]
     along = unit_vectors(np.gradient(centre, axis=1))
-    outwards = centre - middle
-    away = unit_vectors(outwards - (outwards * along).sum(axis=-1, keepdims=True) * along)
+    away = unit_vectors(across(along, centre - middle))
     offset = points - np.repeat(centre, count, axis=0)
     flat = np.cross(along, away)
     # the scatter of the strands in the plane across the card, as a symmetric 2 x 2 matrix
@@ -86,12 +85,12 @@ def make_cards(strands: Strands, lock: Int64Array, stations: int, middle: Float6
     # the flat side's angle is known up to half a turn: the nearer one of each next station
     angle = 0.5 * np.unwrap(np.arctan2(2 * xy, xx - yy + FLAT * (xx + yy)), axis=1)
     angle += np.pi * (np.cos(angle).mean(axis=1, keepdims=True) < 0)
-    across = np.cos(angle)[..., None] * flat + np.sin(angle)[..., None] * away
-    outward = np.cross(across, along)
+    wide = np.cos(angle)[..., None] * flat + np.sin(angle)[..., None] * away
+    outward = np.cross(wide, along)
     spread = np.cos(angle) ** 2 * xx + np.sin(2 * angle) * xy + np.sin(angle) ** 2 * yy
     half = SPREAD * np.sqrt(np.maximum(spread, 0))
     half = np.maximum(half, LEAST_SHARE * half.max(axis=1, keepdims=True))
-    return Cards(centre, across, outward, np.maximum(half, LEAST_HALF), lock)
+    return Cards(centre, wide, outward, np.maximum(half, LEAST_HALF), lock)
 
 
 def _some_of_each(lock: Int64Array) -> Int64Array:
