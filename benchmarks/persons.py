@@ -35,6 +35,7 @@ from video import (
     photo_numbers,
 )
 
+from hairkit.arrays import BoolArray, Float64Array
 from hairkit.head_model.template import default_head
 from hairkit.rendering.picture import draw_views
 from hairkit.synth import STYLES, Style, StyleName, grow
@@ -68,6 +69,10 @@ KINDS = {
     "waist": _like("straight", length=0.55, points=110, cut=-0.45, parting=0.0),
     "crop": _like("short", length=0.012, points=16),
     "bun": _like("tied", tail=0.06),
+    "undercut": _like(
+        "short", length=0.08, points=48, lift=0.5, bend=0.06, layer=0.015, clumps=140, clumping=0.7,
+        frizz=0.002, length_spread=0.15,
+    ),
     "side": _like("parted", length=0.14, points=48, cut=None, parting=0.04),
 }  # fmt: skip
 COLOURS = (
@@ -83,6 +88,9 @@ FACE = np.array([0.075, 0.03])
 """Half the width of the face, and how far before the head's origin it begins; a fringe is there."""
 BROWS, FRINGE_SPREAD = -0.012, 0.004
 """Height where a fringe ends, and its standard deviation, metres."""
+SIDES, TOP, SHAVED = 0.02, 0.05, 0.2
+"""Heights in metres of roots up to which the hair of an undercut is short, and from which it is long,
+and the share of the length that short hair has."""
 LENSES = {"main": MAIN_LENS, "far": FAR, "below": BELOW}
 
 
@@ -113,6 +121,8 @@ def photograph(kind: str, seed: int, folder: Path, lens: Lens) -> Film:
         groom = grow("straight", head, STRANDS, seed)
     if kind == "fringe":
         groom = _with_fringe(groom, look.points, generator)
+    if kind == "undercut":
+        groom = _with_shaved_sides(groom, look.points)
     cameras, shot = drifting_cameras(generator, lens), Shoot.prepare(groom, generator)
     room = cluttered_room(cameras[0], generator)
     some = [cameras[k] for k in photo_numbers()]
@@ -147,10 +157,20 @@ def _with_fringe(groom: Groom, points: int, generator: np.random.Generator) -> G
     paths = groom.strands.points.reshape(-1, points, 3).astype(np.float64)
     line = BROWS + FRINGE_SPREAD * generator.standard_normal(len(paths))
     before = (np.abs(paths[..., 0]) < FACE[0]) & (paths[..., 2] > FACE[1])
-    below = before & (paths[..., 1] < line[:, None])
-    cut = cut_strands(paths, below, 4)
+    return _cut(groom, paths, before & (paths[..., 1] < line[:, None]))
+
+
+def _with_shaved_sides(groom: Groom, points: int) -> Groom:
+    """Return the groom with strands that are the shorter, the lower their roots are."""
+    paths = groom.strands.points.reshape(-1, points, 3).astype(np.float64)
+    kept = np.interp(paths[:, 0, 1], [SIDES, TOP], [SHAVED, 1])
+    return _cut(groom, paths, np.linspace(0, 1, points) > kept[:, None])
+
+
+def _cut(groom: Groom, paths: Float64Array, beyond: BoolArray) -> Groom:
+    """Return the groom with paths (N, points, 3) that end where they are `beyond` (N, points)."""
     strands = groom.strands
-    flat = cut.reshape(-1, 3).astype(np.float32)
+    flat = cut_strands(paths, beyond, 4).reshape(-1, 3).astype(np.float32)
     return replace(groom, strands=Strands(flat, strands.offsets, root_uv=strands.root_uv))
 
 

@@ -3,6 +3,7 @@
 The head of the first scene, drawn into every view, tells where no hair grows: face, ears and neck.
 There, what the network takes for hair is face if it has the colours that the landmarks of any view
 enclose, a beard's or the frame of glasses', and hair if not: long hair hangs over cheeks and ears.
+Above the brows neither a beard nor clothes are: dark hair like a jacket is not taken for one there.
 Hair, face, clothes and backdrop have one colour model for all views
 (`hairkit.imaging.hair_colours`). Hair that is then left on bare parts of the head, apart from the
 scalp's, is no hair of the head. Nor is an island behind which no point shows as hair in most of the
@@ -16,7 +17,6 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -24,15 +24,14 @@ import numpy as np
 from hairkit import Camera, Capture, Head, Mask, Scene, hookimpl
 from hairkit.arrays import BoolArray, Float32Array, Float64Array, UInt8Array
 from hairkit.cameras.depth_raster import depth_behind, head_depth
-from hairkit.head_model.bare_head import mark_bare_head
+from hairkit.head_model.bare_head import mark_bare_head, mark_upper_head
 from hairkit.imaging.alpha_matting import refine_near_hair
 from hairkit.imaging.hair_colours import ALL_PHOTOS, HairPrior, label_colours
 from hairkit.imaging.hair_network import find_hair, mark_face
 from hairkit.imaging.masked_filters import reduced_size
 from hairkit.imaging.seeded_segmentation import UNKNOWN
-from hairkit.options import option
 from hairkit.types.capture import View
-from hairkit.types.mask import BACKGROUND, HAIR, PERSON, Masks
+from hairkit.types.mask import HAIR, PERSON, Masks
 
 _LEAST_HAIR = 5e-4
 """Share of the picture below which there is no hair; such a view keeps its mask."""
@@ -52,22 +51,8 @@ photographs of a man, 1 of locks beside the neck on three captures. With 0.1 a s
 stays, with 0.4 two specks go."""
 
 
-@dataclass(frozen=True)
-class Options:
-    """Settings of the masks mended together."""
-
-    given: float = option(
-        0.2,
-        low=0.0,
-        high=1.0,
-        doc="Share of the given mask in the prior; the rest is the network's.",
-    )
-
-
 @hookimpl
-def refine_masks(
-    capture: Capture, masks: tuple[Mask, ...], scene: Scene, options: Options
-) -> Masks:
+def refine_masks(capture: Capture, masks: tuple[Mask, ...], scene: Scene) -> Masks:
     """Label the views again that have neither mask nor strokes."""
     free = [
         index
@@ -76,13 +61,10 @@ def refine_masks(
     ]
     if not free:
         return Masks(masks)
-
-    def prior_of(index: int) -> HairPrior:
-        camera = scene.cameras[index]
-        return _prior(capture.views[index], masks[index], scene.head, camera, options)
-
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        priors = list(pool.map(prior_of, free))
+        priors = list(
+            pool.map(lambda i: _prior(capture.views[i], scene.head, scene.cameras[i]), free)
+        )
         found = zip(label_colours(priors, ALL_PHOTOS), priors, strict=True)
         labels = dict(
             zip(free, (_without_islands(each, prior.bare) for each, prior in found), strict=True)
@@ -102,22 +84,13 @@ def _mend(mask: Mask, prior: HairPrior, kept: UInt8Array) -> Mask:
     return Mask(fine, person_known=True, alpha=alpha)
 
 
-def _prior(view: View, mask: Mask, head: Head, camera: Camera, options: Options) -> HairPrior:
-    """Return what network, mask, landmarks and head say about a view."""
+def _prior(view: View, head: Head, camera: Camera) -> HairPrior:
+    """Return what network, landmarks and head say about a view."""
     size = reduced_size(view.width, view.height)
-    network = find_hair(view)
-    given = _shares(mask, network.shape[1::-1])
-    share = np.float32(options.given)
-    probability = (1 - share) * network + share * given
-    bare = mark_bare_head(head, camera.resized(*size))
-    return HairPrior(view.image, probability, mark_face(view, size), bare)
-
-
-def _shares(mask: Mask, size: tuple[int, int]) -> Float32Array:
-    """Return (height, width, 3) the shares of a mask's labels in the cells of a smaller picture."""
-    labels = np.dstack([mask.labels == label for label in (HAIR, PERSON, BACKGROUND)])
-    shares = cv2.resize(labels.astype(np.float32), size, interpolation=cv2.INTER_AREA)
-    return np.asarray(shares, np.float32)
+    small = camera.resized(*size)
+    upper = mark_upper_head(head, small)
+    bare = mark_bare_head(head, small) * (1 - upper)
+    return HairPrior(view.image, find_hair(view), mark_face(view, size), bare, upper)
 
 
 def _without_islands(labels: UInt8Array, bare: Float32Array) -> UInt8Array:

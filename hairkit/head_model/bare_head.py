@@ -1,4 +1,4 @@
-"""Where a photo shows the part of the head that bears no hair: face, ears and neck."""
+"""Where a photo shows parts of the head that bear no hair (face, ears, neck), and no clothes."""
 
 from __future__ import annotations
 
@@ -16,6 +16,10 @@ FULL, NONE = 0.015, 0.035
 none: the head is an average one, and beards stand off it."""
 POSE_BLUR = 0.004
 """Gaussian in metres over which the border of the scalp is uncertain."""
+UPPER = 0.7
+"""Share of the scalp's height above which a head wears nothing."""
+COVERED, BESIDE = 0.03, 0.06
+"""Metres off that part up to which a pixel may show its hair, and from which it does not."""
 
 
 def mark_bare_head(head: Head, camera: Camera) -> Float32Array:
@@ -35,3 +39,17 @@ def mark_bare_head(head: Head, camera: Camera) -> Float32Array:
     fade = np.clip((NONE - away / metre) / (NONE - FULL), 0, 1)
     marked = ((first & drawn)[row, column] * fade).astype(np.float32)
     return np.asarray(cv2.GaussianBlur(marked, (0, 0), max(POSE_BLUR * metre, 1e-3)), np.float32)
+
+
+def mark_upper_head(head: Head, camera: Camera) -> Float32Array:
+    """Return (H, W) 1 where the camera sees the head above the brows or its hair, 0 far off it.
+
+    Neither a beard nor clothes are there.
+    """
+    low, high = np.quantile(head.vertices[head.scalp > 0.5, 1], [0, 1])
+    upper = head.vertices[head.vertices[:, 1] > low + UPPER * (high - low)]
+    outline = cv2.convexHull(camera.project(upper).astype(np.float32)).astype(np.int32)
+    beside = np.ones((camera.height, camera.width), np.uint8)
+    cv2.fillConvexPoly(beside, outline, 0)
+    away = cv2.distanceTransform(beside, cv2.DIST_L2, 5) / camera.pixels_per_metre
+    return np.clip((BESIDE - away) / (BESIDE - COVERED), 0, 1).astype(np.float32)

@@ -5,7 +5,8 @@ each class where it is sure, and then labels every pixel. All photos of a person
 A beard, brows and glasses have the colours of hair, so the face has a mixture of its own, learnt
 inside the landmarks, where it is known what they are. On the part of the head that bears no hair a
 network's hair is taken for face where it has the face's colours: the beard of a profile is
-known from the frontal photos, and hair that hangs over a shaven cheek remains hair.
+known from the frontal photos, and hair that hangs over a shaven cheek remains hair. Above the brows
+a person is hair or skin: hair with the colours of the clothes remains hair.
 """
 
 from __future__ import annotations
@@ -57,7 +58,9 @@ class HairPrior:
     face: Float32Array
     """(h, w) of the reduced picture that is labelled: 1 where landmarks show the face, else 0."""
     bare: Float32Array
-    """(h, w) 0 to 1, where the head is known to bear no hair."""
+    """(h, w) 0 to 1, where the head is known to bear no hair but a beard."""
+    upper: Float32Array
+    """(h, w) 0 to 1, where the head is known to wear neither a beard nor clothes."""
 
 
 def label_colours(photos: Sequence[HairPrior], settings: LabelSettings) -> list[UInt8Array]:
@@ -71,7 +74,8 @@ def label_colours(photos: Sequence[HairPrior], settings: LabelSettings) -> list[
         _of_classes(p, photo.face, 0.0)[THINNED] for p, photo in zip(resized, photos, strict=True)
     ]
     priors = [
-        _of_classes(p, photo.bare, _FACIAL_HAIR) for p, photo in zip(resized, photos, strict=True)
+        _of_classes(p, photo.bare, _FACIAL_HAIR, photo.upper)
+        for p, photo in zip(resized, photos, strict=True)
     ]
     few = [rows[THINNED] for rows in features]
     mixtures = _learn(few, taught, settings)
@@ -104,11 +108,15 @@ def _resized(photo: HairPrior) -> Float32Array:
     return np.asarray(positive / positive.sum(axis=-1, keepdims=True))
 
 
-def _of_classes(probability: Float32Array, region: Float32Array, share: float) -> Float32Array:
-    """Return (h, w, 4) with the face, which in `region` is the person and a share of the hair."""
+def _of_classes(
+    probability: Float32Array, region: Float32Array, share: float, upper: Float32Array | float = 0.0
+) -> Float32Array:
+    """Return (h, w, 4) with the face: in `region` the person and a share of the hair, where nothing
+    is worn all of the person."""
     hair, person, background = np.moveaxis(probability, -1, 0)
     taken = np.float32(share) * region * hair
     face = region * person / (2 if share else 1)
+    face += upper * (person - face)
     result = np.dstack([hair - taken, person - face, background, face + taken])
     return np.asarray(np.maximum(result, np.float32(_LEAST_PROBABILITY) ** 2), np.float32)
 

@@ -5,13 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hairkit.head_model.bare_head import FULL, NONE, mark_bare_head
+from hairkit.head_model.bare_head import BESIDE, FULL, NONE, mark_bare_head, mark_upper_head
 from hairkit.head_model.template import default_head
 from hairkit.types.camera import Camera
 
 PIXELS = 1000.0
 """Pixels a metre of the orthographic cameras."""
 NOSE, CROWN = (0.0, -0.07, 0.1), (0.0, 0.065, 0.0)
+ABOVE, COLLAR = (0.0, 0.09, 0.0), (0.0, -0.2, -0.08)
+"""Hair on the crown, and where a hood lies behind the neck."""
 
 
 def camera(azimuth: float) -> Camera:
@@ -51,7 +53,18 @@ def test_a_mirrored_view_is_the_mirror_image() -> None:
     assert np.abs(left - right[:, ::-1]).mean() < 0.01
 
 
+@pytest.mark.parametrize("azimuth", [0, 90, 180])
+def test_the_upper_head_reaches_from_the_brows_to_the_hair_on_it(azimuth: float) -> None:
+    """Crown and the hair above it are of the upper head from all sides; chin and collar are not."""
+    upper = mark_upper_head(default_head(), camera(azimuth))
+    chin, higher = (0.0, -0.11, 0.08), (0.0, CROWN[1] + BESIDE + 0.02, 0.0)
+    for point, share in ((CROWN, 1), (ABOVE, 1), (higher, 0), (chin, 0), (COLLAR, 0)):
+        u, v = camera(azimuth).project(point)
+        assert upper[int(v), int(u)] == share
+
+
 def test_no_head_marks_nothing() -> None:
-    """A camera that does not see the head gets an empty map."""
+    """A camera that does not see the head gets empty maps."""
     away = Camera.on_turn(0, target=(9, 9, 0), distance=1.0, focal=900, width=80, height=60)
     assert not mark_bare_head(default_head(), away).any()
+    assert not mark_upper_head(default_head(), away).any()

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from hairkit.arrays import Float32Array, UInt8Array
 from hairkit.imaging.hair_colours import ALL_PHOTOS, HairPrior, label_colours
-from hairkit.types.mask import HAIR
+from hairkit.types.mask import HAIR, PERSON
 
 SKIN, BROWN, BLUE, GREY = (205, 155, 130), (70, 50, 38), (40, 60, 120), (160, 170, 180)
 """Colours of skin, of hair, of a coat and of a backdrop."""
@@ -32,7 +34,8 @@ def prior(jaw: tuple[int, int, int], hair: float, *, frontal: bool) -> HairPrior
         probability[ROWS[name]] = share
     region: Float32Array = np.zeros((SIZE, SIZE), np.float32)
     region[ROWS["jaw"]] = 1
-    return HairPrior(photo(jaw), probability, region if frontal else 0 * region, bare=region)
+    nothing = 0 * region
+    return HairPrior(photo(jaw), probability, region if frontal else nothing, region, nothing)
 
 
 def hairy(labels: UInt8Array) -> float:
@@ -56,6 +59,19 @@ def test_hair_hangs_over_a_shaven_jaw() -> None:
         prior(SKIN, 0.02, frontal=True), prior(BROWN, 0.9, frontal=False),
     )  # fmt: skip
     assert hairy(label_colours([front, profile], ALL_PHOTOS)[1]) > 0.95
+
+
+def test_hair_of_the_colours_of_the_coat_is_hair_where_no_clothes_are() -> None:
+    """Of two brown bands that a network calls clothes, the one on the upper head is hair."""
+    front, dark = (prior(SKIN, 0.02, frontal=True), prior(BROWN, 0.1, frontal=False))  # fmt: skip
+    picture = dark.image.copy()
+    picture[ROWS["coat"]] = picture[ROWS["jaw"]]
+    coat = replace(dark, image=picture, bare=0 * dark.bare)
+    assert hairy(label_colours([front, coat], ALL_PHOTOS)[1]) < 0.05
+    upper = replace(coat, upper=dark.bare)
+    labels = label_colours([front, upper], ALL_PHOTOS)[1]
+    assert hairy(labels) > 0.95
+    assert (labels[ROWS["coat"]][4:-4] == PERSON).all()
 
 
 @pytest.mark.parametrize("repeated", [2, 3])

@@ -45,8 +45,7 @@ def set_up() -> tuple[Capture, tuple[Mask, ...], Scene]:
 
 
 def refine(capture: Capture, masks: tuple[Mask, ...], scene: Scene) -> tuple[Mask, ...]:
-    options = head_prior.Options()
-    return head_prior.refine_masks(capture=capture, masks=masks, scene=scene, options=options).views
+    return head_prior.refine_masks(capture=capture, masks=masks, scene=scene).views
 
 
 def test_masks_and_strokes_of_the_user_are_kept() -> None:
