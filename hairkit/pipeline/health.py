@@ -72,8 +72,9 @@ COVERED = Limits(0.9, 0.8, "masks", "hair that all views agree on, worst view")
 AGREEMENT = Limits(0.75, 0.68, "hull", "overlap with the masks")
 """At least 0.82 on captures as they are, 0.77 on photos alone; at most 0.62 when
 shuffled, 0.65 with wrong azimuths."""
-BARE_FACE = Limits(0.02, 0.2, "masks", "face called hair")
-"""At most 0.01 on captures as they are; 0.46 with a beard in the masks, 0.3 to 1 with the face."""
+BARE_FACE = Limits(0.1, 0.2, "masks", "face called hair")
+"""At most 0.08 with the true masks of 17 turns, where hair hangs before the face; 0.46 with a beard
+in the masks, 0.3 to 1 with the face."""
 GROWN = Limits(0.98, 0.9, "strands", "roots grown")
 """1.00 on all captures; a warning is logged below the first."""
 LENGTH = Limits(0.3, 0.15)
@@ -206,7 +207,8 @@ def assess_cameras(scene: Scene) -> tuple[Figure, ...]:
 
 
 def assess_masks(masks: Sequence[Mask], scene: Scene) -> tuple[Figure, ...]:
-    """Return the share of the face below the brows called hair, of the worst frontal view."""
+    """Return the share of the face below the brows called hair, of the middle frontal view: seen
+    from aside, a third of a face may be behind its hair."""
     corners = scene.head.landmark_vertices
     if corners is None:
         return ()
@@ -218,7 +220,7 @@ def assess_masks(masks: Sequence[Mask], scene: Scene) -> tuple[Figure, ...]:
     }
     if not shares:
         return ()
-    name, share = max(shares.items(), key=lambda item: item[1])
+    name, share = sorted(shares.items(), key=lambda item: item[1])[len(shares) // 2]
     note = f"glasses, beard or skin became hair; look at the mask of {name}"
     return (BARE_FACE.figure(share, note),)
 

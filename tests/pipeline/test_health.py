@@ -354,6 +354,17 @@ def test_a_beard_in_the_masks_is_red(run: Run) -> None:
     assert run.figures()["masks: face called hair"].light == RED
 
 
+def test_hair_before_the_face_of_one_view_is_no_fault(run: Run) -> None:
+    """A lock that hides the face in one of three frontal views says nothing; in two it does."""
+    whole, name = run.masks, "masks: face called hair"
+    hairy_face(run)
+    hidden = run.masks
+    run.masks = (whole[0], hidden[1], *whole[2:])
+    assert run.figures()[name].light == GREEN
+    run.masks = (whole[0], hidden[1], *whole[2:7], hidden[7])
+    assert run.figures()[name].light == RED
+
+
 def test_short_hair_of_half_its_length_is_not_green(run: Run) -> None:
     """Hair that covers the head all the same is missed where it stands out over the outline."""
     points = run.groom.strands.resampled(21).points.reshape(-1, 21, 3)[:, :11]
