@@ -145,7 +145,7 @@ class Search:
             trial = replace(fit, vector=vector, offset=offset)
             there = self.evidence(trial, noise)
             trial = replace(trial, cost=self.cost(trial, there))
-            if trial.cost > fit.cost * (1 + WORSE):
+            if not trial.cost <= fit.cost * (1 + WORSE):  # or not finite
                 damping *= 10
                 if damping > MOST_DAMPING:
                     break

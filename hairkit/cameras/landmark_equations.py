@@ -34,6 +34,8 @@ of 44. Their landmarks are off by 5 to 12 mm, all of a face one way, so that man
 one."""
 MIDLINE = np.array([27, 28, 29, 30, 33, 51, 57, 8])
 """Nose, lips and chin: they lie on the outline of a view from the side."""
+SHOWN = 0.25
+"""Least share of them without hair near: where less shows, the face is on the other side."""
 AFFINE_SPREAD, SMOOTH_SPREAD, SMOOTH_LENGTH = 0.004, 0.004, 0.04
 PLACE_SPREAD, LOOSE_SPREAD = 0.004, 0.0015
 """Variation between heads, metres: stretch over `AFFINE_LENGTH`, smooth deformation and its
@@ -154,13 +156,10 @@ class LandmarkFit:
     profile_noise: float
     """Standard deviation of that, pixels."""
     cranium: Cranium | None = None
-    """What outlines show of it; none where they show nothing."""
+    """What outlines show of it; None where masks are of hair alone."""
 
     def with_cranium(self, cranium: Cranium, cameras: CameraArrays) -> LandmarkFit:
-        """Return the fit with those points of a cranium that cameras see on a bare outline.
-
-        The others would tell nothing: most heads have hair all round, and gain no point.
-        """
+        """Return the fit with those points of a cranium that cameras see on a bare outline."""
         every = replace(self, landmarks=np.concatenate([self.landmarks, cranium.points]))
         view, point, share = cranium.rims(cameras)
         pixels, *_ = every.project(LANDMARKS + point, view, np.zeros((1, 3)), cameras)
@@ -168,8 +167,6 @@ class LandmarkFit:
         share = share * cranium.bare(view, pixels - value[:, None] * slope)
         near = np.abs(value) < GATE * self.profile_noise
         shown = cranium.select(np.unique(point[near & (share > 0)]))
-        if not len(shown.points):
-            return self
         points = np.concatenate([self.landmarks, shown.points])
         return replace(self, landmarks=points, precision=shape_precision(points), cranium=shown)
 
@@ -223,10 +220,8 @@ class LandmarkFit:
     def _outline_rows(
         self, offset: Float64Array, cameras: CameraArrays, tangents: Float64Array
     ) -> tuple[Float64Array, Float64Array, Float64Array, Int64Array, float]:
-        """Return rows that bring the face's midline on to the outline of views from the side.
-
-        So they do the cranium's rim on to the outline where that is bare. Last comes the cost.
-        """
+        """Return rows that bring the face's midline, in views from the side, and the cranium's rim
+        on to the outline where that is bare: hair hides a face. Last comes the cost."""
         view = np.repeat(self.profiles, len(MIDLINE))
         point = np.tile(MIDLINE, len(self.profiles))
         share = np.ones(len(view))
@@ -238,7 +233,9 @@ class LandmarkFit:
         value, slope = _sample(self.fields, self.scale, view, pixels)
         if self.cranium is not None:
             bare = self.cranium.bare(view, pixels - value[:, None] * slope)
-            share = np.where(point < LANDMARKS, share, share * bare)
+            faces = bare[: len(MIDLINE) * len(self.profiles)].reshape(-1, len(MIDLINE))
+            faces[:] = faces.mean(axis=1, keepdims=True) >= SHOWN
+            share = share * bare
         residual = -value / self.profile_noise
         weight = np.sqrt(share * soft_l1_weight(residual)) / self.profile_noise
         weight = np.where(np.abs(residual) < GATE, weight, 0.0)

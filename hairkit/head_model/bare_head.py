@@ -52,4 +52,4 @@ def mark_upper_head(head: Head, camera: Camera) -> Float32Array:
     beside = np.ones((camera.height, camera.width), np.uint8)
     cv2.fillConvexPoly(beside, outline, 0)
     away = cv2.distanceTransform(beside, cv2.DIST_L2, 5) / camera.pixels_per_metre
-    return np.clip((BESIDE - away) / (BESIDE - COVERED), 0, 1).astype(np.float32)
+    return np.asarray(np.clip((BESIDE - away) / (BESIDE - COVERED), 0, 1), np.float32)

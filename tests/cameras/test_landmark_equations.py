@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from turntable import Turntable, turntable
+from turntable import Turntable, bald_masks, turntable
 
 from hairkit import Capture, Mask, View
 from hairkit.arrays import Float64Array
@@ -18,7 +18,9 @@ from hairkit.cameras.landmark_equations import (
 )
 from hairkit.cameras.outlines import Outlines
 from hairkit.cameras.turntable import Turn
+from hairkit.head_model.cranium import Cranium
 from hairkit.types.face import Face
+from hairkit.types.mask import HAIR, PERSON
 from hairkit.types.person import Person
 
 
@@ -135,3 +137,18 @@ def test_rows_are_derivatives(bust: Turntable, fit: LandmarkFit) -> None:
     want = np.einsum("nik,nk->ni", by_camera, tangents[view] @ step)
     want += np.einsum("nik,nk->ni", by_point, bend[point])
     assert np.allclose(got, want, atol=0.01 * np.abs(want).max())
+
+
+def test_a_view_whose_face_is_behind_hair_is_no_profile(bust: Turntable, fit: LandmarkFit) -> None:
+    """A photo from behind that is taken for one from the side pulls no nose on to its outline."""
+    turn, vector = _start(bust)
+    cameras, tangents = (*turn.unpack(vector), turn.centres), turn.tangents(vector)
+    bald = bald_masks(bust.masks)
+    whole = np.where(bald[2].labels == PERSON, HAIR, bald[2].labels).astype(np.uint8)
+    from_behind = (*bald[:2], Mask(whole, True), *bald[3:])
+    pulled = []
+    for masks in (bald, from_behind):
+        cranium = Cranium.of(bust.head, masks, fit.scale).select(np.zeros(0, np.int64))
+        rows, *_ = replace(fit, cranium=cranium)._outline_rows(np.zeros((68, 3)), cameras, tangents)
+        pulled.append(np.abs(rows).reshape(2, -1).sum(axis=1) > 0)
+    assert [side.tolist() for side in pulled] == [[True, True], [False, True]]
