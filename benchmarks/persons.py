@@ -89,8 +89,8 @@ FACE = np.array([0.075, 0.03])
 BROWS, FRINGE_SPREAD = -0.012, 0.004
 """Height where a fringe ends, and its standard deviation, metres."""
 SIDES, TOP, SHAVED = 0.02, 0.05, 0.2
-"""Heights in metres of roots up to which an undercut's hair is short, and from which it is long; the
-share of the length that short hair has."""
+"""Heights in metres of roots up to which an undercut's hair is short, and from which it is long,
+and the share of the length that short hair has."""
 LENSES = {"main": MAIN_LENS, "far": FAR, "below": BELOW}
 
 

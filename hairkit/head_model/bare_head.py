@@ -51,5 +51,5 @@ def mark_upper_head(head: Head, camera: Camera) -> Float32Array:
     outline = cv2.convexHull(camera.project(upper).astype(np.float32)).astype(np.int32)
     beside = np.ones((camera.height, camera.width), np.uint8)
     cv2.fillConvexPoly(beside, outline, 0)
-    away = cv2.distanceTransform(beside, cv2.DIST_L2, 5) / camera.pixels_per_metre
+    away = cv2.distanceTransform(beside, cv2.DIST_L2, cv2.DIST_MASK_5) / camera.pixels_per_metre
     return np.asarray(np.clip((BESIDE - away) / (BESIDE - COVERED), 0, 1), np.float32)
