@@ -13,6 +13,7 @@ azimuth, health lights and processor seconds.
 from __future__ import annotations
 
 import argparse
+import re
 import tempfile
 from dataclasses import replace
 from pathlib import Path
@@ -92,23 +93,33 @@ SIDES, TOP, SHAVED = 0.02, 0.05, 0.2
 """Heights in metres of roots up to which an undercut's hair is short, and from which it is long,
 and the share of the length that short hair has."""
 LENSES = {"main": MAIN_LENS, "far": FAR, "below": BELOW}
+PERSON = re.compile(f"({'|'.join(KINDS)}):([0-9]+)(?::({'|'.join(LENSES)}))?")
 
 
 def main() -> None:
     """Print a row for each person, and the mean."""
     parser = argparse.ArgumentParser(prog="persons.py", description=__doc__.splitlines()[0])
-    parser.add_argument("persons", nargs="+", metavar="KIND:SEED[:LENS]", help=", ".join(KINDS))
+    parser.add_argument(
+        "persons", nargs="+", type=_person, metavar="KIND:SEED[:LENS]", help=", ".join(KINDS)
+    )
     args = parser.parse_args()
     print(f"| person | {' | '.join(COLUMNS)} |")
     print("|---|" + "---|" * len(COLUMNS))
     rows = []
     for person in args.persons:
-        kind, seed, *lens = person.split(":")
+        kind, seed, lens = person.groups()
         with tempfile.TemporaryDirectory() as made:
-            film = photograph(kind, int(seed), Path(made), LENSES[lens[0]] if lens else CROPPED)
+            film = photograph(kind, int(seed), Path(made), LENSES[lens] if lens else CROPPED)
             rows.append(film.figures("8 photos", GUIDES))
-        print(format_row(person, rows[-1]), flush=True)
+        print(format_row(person[0], rows[-1]), flush=True)
     print(format_row("mean", np.mean(rows, axis=0).tolist()))
+
+
+def _person(text: str) -> re.Match[str]:
+    """Return kind, seed and lens of a person."""
+    if read := PERSON.fullmatch(text):
+        return read
+    raise argparse.ArgumentTypeError(f"{text!r}: expected KIND:SEED, or KIND:SEED:LENS")
 
 
 def photograph(kind: str, seed: int, folder: Path, lens: Lens) -> Film:
