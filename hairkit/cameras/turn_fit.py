@@ -67,6 +67,8 @@ FOCAL_SPREAD = 0.03
 ABOVE, LOOSE_ABOVE = np.radians(35), 4.0
 """Elevation (radians) from which a view is one from above, and how much wider the spreads of its
 azimuth and elevation are: such photos belong to no turn, and show no face."""
+NEAREST = 0.2
+"""Metres from a camera to the head's middle at least: nearer ones would lie in the head."""
 PLACE_ROUNDS = 4
 """Rounds of the first place and depths: the magnification settles to 0.1 %."""
 ALL_RAYS_OF = 8
@@ -253,7 +255,7 @@ class TurnFit:
         noise = coarseness * self.noise
         rows, residual, missed = self._coherence_rows(vector, cameras, tangents, noise)
         normal, right = rows.T @ rows, rows.T @ residual
-        cost = soft_l1_cost(missed)
+        cost = soft_l1_cost(missed) if cameras[1][:, 2].min() > NEAREST else np.inf
         if self.focal is not None and not fit.flat:
             row, off = self._focal_row(vector, self.focal)
             normal, right = normal + np.outer(row, row), right + row * off

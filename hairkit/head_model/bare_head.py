@@ -46,8 +46,8 @@ def mark_upper_head(head: Head, camera: Camera) -> Float32Array:
 
     Neither a beard nor clothes are there.
     """
-    low, high = np.quantile(head.vertices[head.scalp > 0.5, 1], [0, 1])
-    upper = head.vertices[head.vertices[:, 1] > low + UPPER * (high - low)]
+    heights = head.vertices[head.scalp > 0.5, 1]
+    upper = head.vertices[head.vertices[:, 1] > heights.min() + UPPER * np.ptp(heights)]
     outline = cv2.convexHull(camera.project(upper).astype(np.float32)).astype(np.int32)
     beside = np.ones((camera.height, camera.width), np.uint8)
     cv2.fillConvexPoly(beside, outline, 0)

@@ -164,6 +164,36 @@ def test_the_search_also_starts_from_far_away(monkeypatch: pytest.MonkeyPatch) -
     assert distance() < 0.9
 
 
+@pytest.mark.parametrize("beyond", [np.nan, np.inf])
+def test_steps_to_no_finite_cost_are_taken_back(beyond: float) -> None:
+    """The least cost lies where there is none: the search ends before it."""
+    size = SHARED + PER_VIEW * 8
+
+    def evidence(fit: Fit, coarseness: float) -> Evidence:
+        """A valley at 2, of which nothing is known from 1 on."""
+        misses, rows = fit.vector[:1] - 2, np.eye(1, size)
+        cost = float(misses @ misses) if fit.vector[0] < 1 else beyond
+        return Evidence(cost, rows.T @ rows, -rows.T @ misses, None)
+
+    start = np.zeros(size)
+    search = Search(evidence, np.full(size, 100.0), 20)
+    fit, _ = search.descend(Fit(start, np.zeros((68, 3)), True, start), 1.0, 20)
+    assert 0.5 < fit.vector[0] < 1
+    assert np.isfinite(fit.cost)
+
+
+def test_no_camera_lies_in_the_head(bust: Turntable) -> None:
+    """A turn of 15 cm costs more than anything; one of 30 cm does not."""
+    problem = TurnFit.of(bust.capture, bust.masks, bust.head, FAST)
+    start = problem.start(flat=False)
+    costs = []
+    for distance in (0.15, 0.3):
+        vector = start.vector.copy()
+        vector[PERSPECTIVE] = 1 / distance
+        costs.append(problem.evidence(replace(start, vector=vector), 1.0).cost)
+    assert np.isfinite(costs).tolist() == [False, True]
+
+
 def test_nothing_is_evaluated_twice(bust: Turntable, monkeypatch: pytest.MonkeyPatch) -> None:
     """A place where the evidence is known is not looked at again with another precision."""
     asked: list[tuple[bytes, bytes, float]] = []
