@@ -8,8 +8,9 @@ search starts again from turns whose steps are long on one side and short on the
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -25,17 +26,14 @@ FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e3
 COARSE_TO_FINE = (8.0, 4.0, 2.0)
 """Times the noise of outlines in the rounds before the last: over four careless turns their cost
 falls by up to 109 against a start with the last noise, over careful ones by up to 58."""
-CARE_ROUNDS = 2
-"""Updates of the precision at the last noise: it settles to 5 %."""
 CARE_FREEDOM = 4.0
 """Degrees of freedom of the prior of the precision, whose mean is 1; a turn of eight has 48
 deviations."""
 UNEVEN, SIDES = np.radians(18), 8
 """Amplitude of the wave once around that is added to the azimuths of further starts, and how many
 phases it has."""
-UNEVEN_NOISE, UNEVEN_ROUNDS, UNEVEN_KEPT = 2.0, 6, 3
-"""Times the noise of outlines, and rounds, by which these starts are compared; the best so many go
-on for as many rounds at the noise itself."""
+UNEVEN_ROUNDS = 6
+"""Rounds by which these starts are compared, with the last noise of `COARSE_TO_FINE`."""
 FAR = 4.0
 """The search also starts from so many times the usual distance: real people who were photographed
 from some metres away ended at 4 times the cost without, at a wrong height of the camera."""
@@ -91,28 +89,17 @@ class Search:
         any_distance = self.any_distance and not start.flat
         if any_distance:
             starts.append(_farther(start, FAR))
-        found = [self._coarsely(each, COARSE_TO_FINE) for each in starts]
-        fit = self.settle(*min(found, key=lambda each: each[0].cost))
+        fit = _best(self.settle(each, COARSE_TO_FINE) for each in starts)
         if any_distance:
             fit = self._from_distances(fit)
-        uneven = self._from_uneven_turns(fit, azimuths)
-        return fit if uneven is fit else self.settle(uneven, updates=1)
-
-    def _coarsely(self, fit: Fit, noises: Sequence[float]) -> tuple[Fit, Evidence | None]:
-        """Return the solution to which rounds with these times the noise lead, and its evidence."""
-        seen = None
-        for noise in noises:
-            fit, _ = self.descend(fit, noise, self.iterations)
-            seen = self.evidence(fit, 1.0)
-            fit = self._with_care(fit, seen)
-        return fit, seen
+        return self.settle(self._from_uneven_turns(fit, azimuths))
 
     def _from_distances(self, fit: Fit) -> Fit:
         """Return the best solution from greater distances on, or else from smaller ones."""
         first = fit
         for way in (FARTHER, 1 / FARTHER):
             for _ in range(MOST_FARTHER):
-                trial = self.settle(*self._coarsely(_farther(fit, way), FARTHER_NOISE))
+                trial = self.settle(_farther(fit, way), FARTHER_NOISE)
                 if trial.cost >= fit.cost:
                     break
                 fit = trial
@@ -120,12 +107,17 @@ class Search:
                 break
         return fit
 
-    def settle(self, fit: Fit, seen: Evidence | None = None, updates: int = CARE_ROUNDS) -> Fit:
-        """Return the solution with the precision that its deviations tell; see `descend`."""
-        for _ in range(updates):
-            fit, seen = self.descend(fit, 1.0, self.iterations, seen)
-            fit = self._with_care(fit, seen)
-        return self.descend(fit, 1.0, self.iterations, seen)[0]
+    def settle(self, fit: Fit, noises: Sequence[float] = (1.0, 1.0)) -> Fit:
+        """Return the solution to which descents with these times the noise lead.
+
+        After each the precision is what its deviations tell; then follows one more; see `descend`.
+        """
+        seen = None
+        for noise, following in pairwise((*noises, noises[-1])):
+            fit, seen = self.descend(fit, noise, self.iterations, seen)
+            fit = self._with_care(fit, seen if noise == 1 else self.evidence(fit, 1.0))
+            seen = seen if following == noise else None
+        return self.descend(fit, noises[-1], self.iterations, seen)[0]
 
     def descend(
         self, fit: Fit, noise: float, iterations: int, seen: Evidence | None = None
@@ -198,15 +190,17 @@ class Search:
         Opposite views have mirrored outlines and hold each other where they are; such turns move
         them against each other.
         """
-        trials = []
+        trials = [fit]
         for phase in np.linspace(0, 2 * np.pi, SIDES, endpoint=False):
             vector = fit.vector.copy()
             vector[SHARED::PER_VIEW] += UNEVEN * np.cos(azimuths - phase)
             trial = replace(fit, vector=vector)
-            trials.append(self.descend(trial, UNEVEN_NOISE, UNEVEN_ROUNDS)[0])
-        trials.sort(key=lambda trial: trial.cost)
-        last = [self.descend(trial, 1.0, UNEVEN_ROUNDS)[0] for trial in trials[:UNEVEN_KEPT]]
-        return min([fit, *last], key=lambda trial: trial.cost)
+            trials.append(self.descend(trial, COARSE_TO_FINE[-1], UNEVEN_ROUNDS)[0])
+        return _best(trials)
+
+
+def _best(fits: Iterable[Fit]) -> Fit:
+    return min(fits, key=lambda each: each.cost)
 
 
 def _farther(fit: Fit, times: float) -> Fit:

@@ -74,6 +74,10 @@ class Outlines:
         points = self.points[np.concatenate(mine)]
         return replace(self, fields=self.fields[order], points=points, views=views)
 
+    def thinned(self, every: int) -> Outlines:
+        """Return the outlines with one of `every` so many contour points."""
+        return replace(self, points=self.points[::every], views=self.views[::every])
+
     def crowns(self, ratio: float) -> tuple[Float64Array, Float64Array, Float64Array]:
         """Return each silhouette's top row, and middle column and width `ratio` widths below it.
 

@@ -56,6 +56,8 @@ SOFT = 0.3
 """A contour ray counts as missing gradually, over this many times the outline's noise."""
 SOFT_MIN = 0.3
 """Softness of the minimum over silhouettes, times the outline's noise."""
+NOISE_OF_ALL = 2.0
+"""Times the noise up to which all contour points count; with so many times more, one of as many."""
 NEAR = 6.0
 """Rays that stay farther inside than this many times the noise tell nothing."""
 FROM_THE_SIDE = 0.35
@@ -253,9 +255,10 @@ class TurnFit:
         vector = fit.vector
         cameras, tangents = self.cameras(vector), self.turn.tangents(vector)
         noise = coarseness * self.noise
-        rows, residual, missed = self._coherence_rows(vector, cameras, tangents, noise)
-        normal, right = rows.T @ rows, rows.T @ residual
-        cost = soft_l1_cost(missed) if cameras[1][:, 2].min() > NEAREST else np.inf
+        every = max(1, round(coarseness / NOISE_OF_ALL))
+        rows, residual, missed = self._coherence_rows(vector, cameras, tangents, noise, every)
+        normal, right = every * (rows.T @ rows), every * (rows.T @ residual)
+        cost = every * soft_l1_cost(missed) if cameras[1][:, 2].min() > NEAREST else np.inf
         if self.focal is not None and not fit.flat:
             row, off = self._focal_row(vector, self.focal)
             normal, right = normal + np.outer(row, row), right + row * off
@@ -274,13 +277,19 @@ class TurnFit:
         return row / FOCAL_SPREAD, float(np.log(focal) - found) / FOCAL_SPREAD
 
     def _coherence_rows(
-        self, vector: Float64Array, cameras: CameraArrays, tangents: Float64Array, noise: float
+        self,
+        vector: Float64Array,
+        cameras: CameraArrays,
+        tangents: Float64Array,
+        noise: float,
+        every: int,
     ) -> tuple[Float64Array, Float64Array, Float64Array]:
         """Return rows that bring contour rays into the silhouettes they miss, or nearly miss.
 
-        Then their right sides, and by how much they miss, in standard deviations.
+        Of one in `every` contour points; then their right sides, and by how much they miss, in
+        standard deviations.
         """
-        value, slope = self._coherence(vector, cameras, noise)
+        value, slope = self._coherence(vector, cameras, noise, every)
         near = np.nonzero(value < NEAR * noise)[0]
         soft = SOFT * noise
         missed = np.logaddexp(0, -value[near] / soft) * soft / noise
@@ -290,13 +299,13 @@ class TurnFit:
         return rows * (share * weight / noise)[:, None], missed * weight, missed
 
     def _coherence(
-        self, vector: Float64Array, cameras: CameraArrays, noise: float
+        self, vector: Float64Array, cameras: CameraArrays, noise: float, every: int = 1
     ) -> tuple[Float64Array, Float64Array]:
         rotation, translation, *_ = cameras
         middle = np.full(len(rotation), 1 / max(float(vector[PERSPECTIVE]), MIN_PERSPECTIVE))
         if vector[PERSPECTIVE] <= MIN_PERSPECTIVE:  # there distances are zooms, metres apart
             middle = (rotation @ vector[CENTRE] + translation)[:, 2]
-        return coherence(self.outlines, *cameras, middle, SOFT_MIN * noise)
+        return coherence(self.outlines.thinned(every), *cameras, middle, SOFT_MIN * noise)
 
     def residual_px(self, fit: Fit) -> float:
         """Return the root mean square misfit of landmarks and missed contour rays, pixels.

@@ -48,7 +48,7 @@ def estimate_scene(
         best = best if carries else search.settle(best)
     for _ in range(carries):
         transferred = _transferred(problem, capture, best)
-        best = transferred.search(options.iterations).settle(best, updates=1)
+        best = transferred.search(options.iterations).settle(best, (1.0,))
     names = tuple(view.name for view in capture.views)
     return Scene(names, problem.turn.cameras(best.vector), head, problem.residual_px(best))
 
