@@ -18,9 +18,9 @@ from hairkit.arrays import Float64Array
 from hairkit.cameras.landmark_equations import LandmarkEquations
 from hairkit.cameras.turntable import MIN_PERSPECTIVE, PER_VIEW, PERSPECTIVE, SHARED
 
-SETTLED, WORSE = 1e-3, 1e-9
-"""Stop when the cost falls by less than this share; a step that costs more by the second share
-is taken back."""
+SETTLED, SETTLED_COARSELY, WORSE = 1e-3, 1e-2, 1e-9
+"""Stop when the cost falls by less than the first share, the second while outlines are coarse; a
+step that costs more by the third share is taken back."""
 FIRST_DAMPING, MOST_DAMPING = 1e-3, 1e3
 """Of Levenberg-Marquardt, times the diagonal of the normal equations."""
 COARSE_TO_FINE = (8.0, 4.0, 2.0)
@@ -127,6 +127,7 @@ class Search:
         `seen` is the evidence at the solution where it is known.
         """
         damping = FIRST_DAMPING
+        least = SETTLED if noise <= 1 else SETTLED_COARSELY
         here = self.evidence(fit, noise) if seen is None else seen
         fit = replace(fit, cost=self.cost(fit, here))
         for _ in range(iterations):
@@ -142,7 +143,7 @@ class Search:
                 if damping > MOST_DAMPING:
                     break
                 continue
-            settled = fit.cost - trial.cost < SETTLED * fit.cost
+            settled = fit.cost - trial.cost < least * fit.cost
             fit, here, damping = trial, there, damping / 5
             if settled:
                 break

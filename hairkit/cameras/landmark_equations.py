@@ -128,14 +128,12 @@ class LandmarkEquations:
     right: Float64Array
     """(P,)."""
     cost: float
-    _pull: Float64Array
-    _coupling: Float64Array
-    _shape: Float64Array
+    _solved: Float64Array
+    """(3 N, P + 1) how the offsets give way to the cameras' numbers, and those without a step."""
 
     def offsets(self, move: Float64Array) -> Float64Array:
         """Return the best offsets (N, 3) of the points after a step of the cameras, metres."""
-        best = np.linalg.solve(self._shape, self._pull - self._coupling @ move)
-        return np.asarray(best.reshape(-1, 3), np.float64)
+        return (self._solved[:, -1] - self._solved[:, :-1] @ move).reshape(-1, 3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,7 +263,7 @@ class LandmarkFit:
         normal = rows.T @ rows - flat.T @ solved[:, :-1]
         right = rows.T @ residual - flat.T @ solved[:, -1]
         cost = float(residual @ residual - pull @ solved[:, -1])
-        return LandmarkEquations((normal + normal.T) / 2, right, cost, pull, flat, shape)
+        return LandmarkEquations((normal + normal.T) / 2, right, cost, solved)
 
 
 CameraArrays = tuple[Float64Array, Float64Array, Float64Array, Float64Array]

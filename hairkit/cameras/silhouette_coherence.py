@@ -20,7 +20,7 @@ REACH = 0.28
 """Rays are searched this far before and behind the turn's centre, metres: heads are smaller."""
 STEPS = (0.03, 0.0015)
 """Steps of two searches along a ray, metres: the second passes over what cannot beat the first."""
-FINE = 5
+FINE = 3
 """Halvings of the step after them."""
 STEEPEST = 1.5
 """Bound of the slope of signed distances: 1, but more between pixels and off the picture."""

@@ -255,10 +255,10 @@ class TurnFit:
         vector = fit.vector
         cameras, tangents = self.cameras(vector), self.turn.tangents(vector)
         noise = coarseness * self.noise
-        every = max(1, round(coarseness / NOISE_OF_ALL))
-        rows, residual, missed = self._coherence_rows(vector, cameras, tangents, noise, every)
-        normal, right = every * (rows.T @ rows), every * (rows.T @ residual)
-        cost = every * soft_l1_cost(missed) if cameras[1][:, 2].min() > NEAREST else np.inf
+        rows, residual, cost = self._coherence_rows(vector, cameras, tangents, noise)
+        normal, right = rows.T @ rows, rows.T @ residual
+        if cameras[1][:, 2].min() <= NEAREST:
+            cost = np.inf
         if self.focal is not None and not fit.flat:
             row, off = self._focal_row(vector, self.focal)
             normal, right = normal + np.outer(row, row), right + row * off
@@ -277,26 +277,25 @@ class TurnFit:
         return row / FOCAL_SPREAD, float(np.log(focal) - found) / FOCAL_SPREAD
 
     def _coherence_rows(
-        self,
-        vector: Float64Array,
-        cameras: CameraArrays,
-        tangents: Float64Array,
-        noise: float,
-        every: int,
-    ) -> tuple[Float64Array, Float64Array, Float64Array]:
+        self, vector: Float64Array, cameras: CameraArrays, tangents: Float64Array, noise: float
+    ) -> tuple[Float64Array, Float64Array, float]:
         """Return rows that bring contour rays into the silhouettes they miss, or nearly miss.
 
-        Of one in `every` contour points; then their right sides, and by how much they miss, in
-        standard deviations.
+        Then their right sides, and the cost.
         """
+        every = max(1, round(noise / self.noise / NOISE_OF_ALL))
         value, slope = self._coherence(vector, cameras, noise, every)
         near = np.nonzero(value < NEAR * noise)[0]
         soft = SOFT * noise
         missed = np.logaddexp(0, -value[near] / soft) * soft / noise
         share = 1 / (1 + np.exp(value[near] / soft))
-        weight = np.sqrt(soft_l1_weight(missed))
+        weight = np.sqrt(every * soft_l1_weight(missed))
         rows = np.tensordot(slope[near], tangents, 2)
-        return rows * (share * weight / noise)[:, None], missed * weight, missed
+        return (
+            rows * (share * weight / noise)[:, None],
+            missed * weight,
+            every * soft_l1_cost(missed),
+        )
 
     def _coherence(
         self, vector: Float64Array, cameras: CameraArrays, noise: float, every: int = 1

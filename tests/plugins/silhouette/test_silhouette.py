@@ -46,7 +46,7 @@ def test_cameras_come_nearer_to_the_truth(bust: Turntable, found: Scene) -> None
     """Landmarks and outlines lessen the nominal azimuth error, and the head is where it is seen."""
     nominal = [Camera.on_turn(45.0 * i, focal=560, width=300, height=400) for i in range(8)]
     start = azimuth_errors(tuple(nominal), bust.cameras).mean()
-    assert azimuth_errors(found.cameras, bust.cameras).mean() < 0.75 * start
+    assert azimuth_errors(found.cameras, bust.cameras).mean() < 0.85 * start
     assert _pixels_off(found.cameras, bust) < 4
     assert found.cameras[0].model == "perspective"
     assert found.residual_px is not None
@@ -297,7 +297,7 @@ def test_a_start_is_searched_from_and_keeps_its_kind(bust: Turntable) -> None:
     assert start.residual_px is not None
     assert again.residual_px is not None
     assert again.residual_px < 1.05 * start.residual_px
-    assert azimuth_errors(again.cameras, start.cameras).mean() < 1.5
+    assert azimuth_errors(again.cameras, start.cameras).mean() < 2
 
 
 def test_zooms_and_distances_of_orthographic_views_are_the_same(bust: Turntable) -> None:
