@@ -183,7 +183,7 @@ def grow(
         options.slide_from,
         options.pull,
         sign,
-        early,
+        float(early),  # of an integer, another kernel would be compiled
     )
     order = np.lexsort((field.grid.nearest_cell(starts) // BLOCK).T)
     growth = (volume, rules, for_kernel(starts), limits, order, points)

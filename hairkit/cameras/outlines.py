@@ -51,21 +51,15 @@ class Outlines:
         height, width = masks[0].labels.shape
         scale = min(1.0, FIELD_HEIGHT / height)
         size = (max(1, round(width * scale)), max(1, round(height * scale)))
-        fields, points, views = [], [], []
+        fields, points = [], []
         whole = all(mask.person_known for mask in masks)
         for view, mask in enumerate(masks):
             silhouette = _smooth(mask.person if whole else mask.hair, size)
             fields.append(_signed_distance(silhouette) / scale)
             contour = _contour(fields[-1] * scale, scale * np.array(shapes[view]), count)
             points.append(contour / scale)
-            views.append(np.full(len(contour), view))
-        return cls(
-            np.stack(fields).astype(np.float32),
-            scale,
-            np.concatenate(points),
-            np.concatenate(views).astype(np.int64),
-            whole,
-        )
+        views = np.repeat(np.arange(len(masks)), [len(each) for each in points])
+        return cls(np.stack(fields), scale, np.concatenate(points), views, whole)
 
     def arranged(self, order: Int64Array) -> Outlines:
         """Return the outlines with the views in another order."""
@@ -76,7 +70,7 @@ class Outlines:
 
     def thinned(self, every: int) -> Outlines:
         """Return the outlines with one of `every` so many contour points."""
-        return replace(self, points=self.points[::every], views=self.views[::every])
+        return replace(self, points=self.points[::every].copy(), views=self.views[::every].copy())
 
     def crowns(self, ratio: float) -> tuple[Float64Array, Float64Array, Float64Array]:
         """Return each silhouette's top row, and middle column and width `ratio` widths below it.
@@ -131,13 +125,11 @@ def _contour(field: Float32Array, shape: Float64Array, count: int) -> Float64Arr
     outlines, _ = cv2.findContours(
         (field > 0).astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE
     )
-    if not outlines:
-        return np.zeros((0, 2))
-    longest = max(outlines, key=len)[:, 0, :].astype(np.float64)
+    longest = max(outlines, key=len, default=np.zeros((0, 1, 2)))[:, 0, :].astype(np.float64)
     kept = (longest >= EDGE).all(1) & (longest < shape[::-1] - EDGE).all(1)
     longest = longest[kept]
     if not len(longest):
-        return np.zeros((0, 2))
+        return longest
     chosen = longest[np.linspace(0, len(longest), count, endpoint=False).astype(int)]
     return _to_edge(field, chosen) + 0.5
 
@@ -145,8 +137,8 @@ def _contour(field: Float32Array, shape: Float64Array, count: int) -> Float64Arr
 def _to_edge(field: Float32Array, points: Float64Array) -> Float64Array:
     """Move points by their signed distance along its gradient on to the edge."""
     smooth = cv2.GaussianBlur(field, (0, 0), SLOPE_SMOOTHING_PX)
-    row_slope, column_slope = np.gradient(smooth)
-    column, row = points.astype(int).T
-    gradient = np.stack([column_slope[row, column], row_slope[row, column]], axis=1)
+    column, row = points.astype(int).T  # off the border, see EDGE
+    across = smooth[row, column + 1] - smooth[row, column - 1]
+    gradient = np.stack([across, smooth[row + 1, column] - smooth[row - 1, column]], axis=1) / 2
     length = np.maximum((gradient**2).sum(1, keepdims=True), LEAST_SLOPE)
     return np.asarray(points - field[row, column][:, None] * gradient / length)

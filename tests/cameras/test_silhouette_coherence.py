@@ -12,7 +12,7 @@ from hairkit import Mask
 from hairkit.arrays import Float64Array
 from hairkit.cameras.landmark_equations import CameraArrays
 from hairkit.cameras.outlines import Outlines
-from hairkit.cameras.silhouette_coherence import CAP, REACH, coherence
+from hairkit.cameras.silhouette_coherence import CAP, REACH, _search_rays, coherence
 from hairkit.cameras.turn_fit import Silhouettes, TurnOptions
 
 MIDDLE = np.full(8, 0.7)
@@ -90,6 +90,17 @@ def test_true_cameras_are_coherent_and_wrong_ones_are_not(
     moved[2, 1] += 0.02
     wrong, _ = coherence(outlines, rotation, moved, focal, centre, MIDDLE)
     assert wrong.min() < -5
+
+
+def test_fewer_rays_have_the_same_values(bust: Turntable, outlines: Outlines) -> None:
+    """One in three contour points, by the kernel that is compiled for all of them."""
+    cameras = _arrays(bust)
+    value, slope = coherence(outlines, *cameras, MIDDLE)
+    compiled = list(_search_rays.signatures)
+    few, few_slopes = coherence(outlines.thinned(3), *cameras, MIDDLE)
+    np.testing.assert_array_equal(few, value[::3])
+    np.testing.assert_array_equal(few_slopes, slope[::3])
+    assert _search_rays.signatures == compiled
 
 
 def test_slopes_are_derivatives(bust: Turntable, outlines: Outlines) -> None:

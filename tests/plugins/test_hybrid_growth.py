@@ -6,7 +6,16 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from hairkit_plugins.hybrid_growth import BELOW, BLIND, LEFT, Options, grow, signed_volume, track
+from hairkit_plugins.hybrid_growth import (
+    BELOW,
+    BLIND,
+    LEFT,
+    Options,
+    _grow_strands,
+    grow,
+    signed_volume,
+    track,
+)
 
 from hairkit.arrays import Float32Array
 from hairkit.field.growth_prior import measure_scalp_distance
@@ -67,6 +76,16 @@ def test_strands_follow_the_sign_of_the_field() -> None:
     up, down = (run(constant((0, s, 0)), inside, replace(FREE, reach=1.0)) for s in (1.0, -1.0))
     np.testing.assert_allclose((up.tips - up.roots)[:, 1], 0.1, atol=2e-3)
     np.testing.assert_allclose(up.tips - up.roots, -(down.tips - down.roots), atol=1e-6)
+
+
+def test_an_integer_compiles_no_kernel_of_its_own() -> None:
+    """The same code serves a share given as 0: a second compilation takes seconds."""
+    inside = np.full(GRID.shape, 0.5, np.float32)
+    run(constant((0, 1, 0)), inside, FREE, early=0.5)
+    compiled = list(_grow_strands.signatures)
+    assert compiled
+    run(constant((0, 1, 0)), inside, FREE, early=0)
+    assert _grow_strands.signatures == compiled
 
 
 def test_a_strand_ends_where_the_internal_distance_passes_the_bound() -> None:
