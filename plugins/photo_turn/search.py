@@ -8,6 +8,7 @@ mirrored, until nothing is cheaper (iterated conditional modes, Besag 1986, from
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 
@@ -27,8 +28,8 @@ GAIN = 1e-6
 ABOVE = 4.0
 """Cost of taking a photo for one from above, less its oddness. Without a photo from above, turns
 cost 3.9 less at most by leaving one out, with the oddness counted; with one, 2 to 9 less."""
-FEWEST_WITH_ABOVE = 7
-"""In smaller turns every photo is unlike the others."""
+FEWEST_WITH_ABOVE, LEFT_OUT = 7, 3
+"""In smaller turns every photo is unlike the others; photos without which the turn costs least."""
 STRAY_DEG = 8.0
 """Standard deviation of a photo's azimuth from its place in an even turn taken by hand."""
 UNEVEN, UNEVEN_DEG = 4.0, 15.0
@@ -60,10 +61,13 @@ def find_arrangements(
     found = search.run(STARTS)
     best = found[0].azimuth_deg
     if len(photos) >= FEWEST_WITH_ABOVE and not np.isinf(evidence.follow):
+        rings = []
         for photo in np.nonzero(~above & ~level & ~fixed)[0]:
             rest = photos[photos != photo]
-            without = Search(evidence, rest, fixed[rest], ABOVE - float(evidence.odd[photo]))
-            found += without.run(STARTS_ABOVE, best[rest])
+            rings.append(Search(evidence, rest, fixed[rest], ABOVE - float(evidence.odd[photo])))
+        rings.sort(key=lambda ring: ring._placed(best[ring.photos]).cost)
+        for ring in rings[:LEFT_OUT]:
+            found += ring.run(STARTS_ABOVE, best[ring.photos])
     found.sort(key=lambda placed: placed.cost)
     left = np.nonzero(~found[0].above)[0]
     paid = found[0].cost - measure_cost(found[0].azimuth_deg[None, left], evidence.only(left))
@@ -131,7 +135,7 @@ class Search:
         azimuth = best.azimuth_deg[self.photos]
         trials = np.concatenate([self._mirrored(azimuth), self._inserted(azimuth)])
         trials = trials[np.argsort(measure_cost(trials, evidence), kind="stable")]
-        others = [trial for trial in trials if moved(self._placed(trial), best).any()][:OTHERS]
+        others = [*islice((t for t in trials if moved(self._placed(t), best).any()), OTHERS)]
         settled = [self._settle(other, evidence) for other in others]
         return [self._placed(other) for other in (*others, *settled)]
 
