@@ -65,9 +65,9 @@ def find_arrangements(
         for photo in np.nonzero(~above & ~level & ~fixed)[0]:
             rest = photos[photos != photo]
             rings.append(Search(evidence, rest, fixed[rest], ABOVE - float(evidence.odd[photo])))
-        rings.sort(key=lambda ring: ring._placed(best[ring.photos]).cost)
-        for ring in rings[:LEFT_OUT]:
-            found += ring.run(STARTS_ABOVE, best[ring.photos])
+        rings.sort(key=lambda without: without._placed(best[without.photos]).cost)
+        for without in rings[:LEFT_OUT]:
+            found += without.run(STARTS_ABOVE, best[without.photos])
     found.sort(key=lambda placed: placed.cost)
     left = np.nonzero(~found[0].above)[0]
     paid = found[0].cost - measure_cost(found[0].azimuth_deg[None, left], evidence.only(left))
