@@ -29,7 +29,7 @@ ABOVE = 4.0
 """Cost of taking a photo for one from above, less its oddness. Without a photo from above, turns
 cost 3.9 less at most by leaving one out, with the oddness counted; with one, 2 to 9 less."""
 FEWEST_WITH_ABOVE, LEFT_OUT = 7, 3
-"""In smaller turns every photo is unlike the others; photos without which the turn costs least."""
+"""In turns of fewer each photo is unlike the others; the photos that save most are left out."""
 STRAY_DEG = 8.0
 """Standard deviation of a photo's azimuth from its place in an even turn taken by hand."""
 UNEVEN, UNEVEN_DEG = 4.0, 15.0
