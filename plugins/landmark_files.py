@@ -15,7 +15,6 @@ from hairkit import View, hookimpl
 from hairkit.arrays import Float64Array
 from hairkit.cameras.turntable import view_angles
 from hairkit.head_model.template import default_head
-from hairkit.io.photos import focal_from_equivalent
 from hairkit.types.face import Face
 from hairkit.types.head import JAW_LANDMARKS
 
@@ -38,8 +37,7 @@ def _direction(view: View, landmarks: Float64Array) -> Float64Array:
     head = default_head()
     assert head.landmark_vertices is not None  # the template has all of them
     places = head.vertices[head.landmark_vertices].astype(np.float64)[JAW_LANDMARKS:]
-    usual = focal_from_equivalent(USUAL_LENS_MM, *view.photo_size) / view.scale
-    focal, (right, down) = view.focal_px or usual, view.centre
+    focal, (right, down) = view.focal_or(USUAL_LENS_MM), view.centre
     lens = np.array([[focal, 0, right], [0, focal, down], [0, 0, 1]])
     _, rotation, _ = cv2.solvePnP(
         places, landmarks[JAW_LANDMARKS:], lens, None, flags=cv2.SOLVEPNP_SQPNP

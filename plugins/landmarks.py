@@ -14,25 +14,18 @@ import numpy as np
 from hairkit import Camera, Capture, Head, Mask, Scene, hookimpl
 from hairkit.arrays import Float64Array
 from hairkit.cameras.similarity import fit_similarity, triangulate
-from hairkit.cameras.turntable import Turn
+from hairkit.cameras.turntable import NominalOptions, nominal_cameras
 from hairkit.errors import InputError
-from hairkit.io.photos import focal_from_equivalent
 from hairkit.options import option
 from hairkit.types.head import JAW_LANDMARKS, LANDMARKS
 
 
 @dataclass(frozen=True)
-class Options:
+class Options(NominalOptions):
     """Settings of the landmark pose."""
 
     model: str = option(
         "orthographic", choices=("orthographic", "perspective"), doc="Kind of the nominal cameras."
-    )
-    focal_equivalent: float = option(
-        42.0, low=10, high=1000, unit="mm", doc="For perspective without EXIF, full frame."
-    )
-    distance: float = option(
-        0.7, low=0.1, high=20, doc="Usual distance of perspective cameras.", unit="m"
     )
     jaw_weight: float = option(
         0.25, low=0, high=1, doc="Weight of the 17 jaw points; others have 1."
@@ -49,7 +42,7 @@ def estimate_scene(
         raise InputError(
             "the head has no landmark_vertices for the plugin 'landmarks'; use the plugin 'manual'"
         )
-    cameras = _nominal(capture, options)
+    cameras = nominal_cameras(capture, options)
     weights = np.where(np.arange(LANDMARKS) < JAW_LANDMARKS, options.jaw_weight, 1.0)
     points = triangulate(cameras, pixels, np.broadcast_to(known[:, None], pixels.shape[:2]))
     scene_from_head = fit_similarity(head.vertices[head.landmark_vertices], points, weights)
@@ -72,16 +65,6 @@ def _gather_landmarks(capture: Capture) -> tuple[Float64Array, Float64Array]:
         if view.landmarks is not None:
             pixels[index] = view.landmarks
     return pixels, known
-
-
-def _nominal(capture: Capture, options: Options) -> tuple[Camera, ...]:
-    """Return the nominal turn at a usual scale; the similarity finds the true one."""
-    turn = Turn.of(capture)
-    view = capture.views[0]
-    usual = focal_from_equivalent(options.focal_equivalent, *view.photo_size) / view.scale
-    focal = view.focal_px or usual
-    perspective = 1 / options.distance if options.model == "perspective" else 0.0
-    return turn.nominal(focal / options.distance, perspective)
 
 
 def _residual_px(

@@ -16,7 +16,6 @@ import numpy as np
 from hairkit import studio
 from hairkit.arrays import Float64Array, UInt8Array
 from hairkit.head_model.template import default_head
-from hairkit.io.photos import focal_from_equivalent
 from hairkit.rendering import Solid, draw_views
 from hairkit.storage import write_bytes
 from hairkit.studio.capture_guides import DISTANCE, LENS_MM, LOOK_AT, guide_at
@@ -24,6 +23,7 @@ from hairkit.studio.feedback import Feedback
 from hairkit.synth.bust import Bust
 from hairkit.synth.growth import grow
 from hairkit.types.camera import Camera
+from hairkit.types.capture import focal_from_equivalent
 from hairkit.types.groom import Groom
 from hairkit.types.person import Person
 

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 from hairkit.arrays import Float64Array
+from hairkit.options import option
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture
 
@@ -26,6 +27,21 @@ ONE_SHAPE = 0.03
 """Photos are of one shape if the logarithms of long over short sides differ by no more."""
 MIN_PERSPECTIVE = 0.01
 """Cameras are at most 1 / this away, metres: there pictures are orthographic to 0.1 pixels."""
+
+
+@dataclass(frozen=True)
+class NominalOptions:
+    """Settings of cameras at the turn's nominal places; plugins inherit them."""
+
+    model: str = option(
+        "perspective", choices=("orthographic", "perspective"), doc="Kind of the nominal cameras."
+    )
+    focal_equivalent: float = option(
+        42.0, low=10, high=1000, unit="mm", doc="Without EXIF or capture.toml, full frame."
+    )
+    distance: float = option(
+        0.7, low=0.1, high=20, doc="From the cameras to the turn's centre.", unit="m"
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,3 +236,11 @@ def _view_rotations(
     down = np.stack([sin_a * sin_e, -cos_e, cos_a * sin_e], axis=-1)
     cosine, sine = np.cos(roll)[..., None], np.sin(roll)[..., None]
     return np.stack([cosine * right - sine * down, sine * right + cosine * down, -back], axis=-2)
+
+
+def nominal_cameras(capture: Capture, options: NominalOptions) -> tuple[Camera, ...]:
+    """Return the cameras of a capture's nominal turn, at the scale of the first photo's lens."""
+    scale = capture.views[0].focal_or(options.focal_equivalent) / options.distance
+    orthographic = options.model == "orthographic" or capture.orthographic
+    perspective = 0.0 if orthographic else 1 / options.distance
+    return Turn.of(capture).nominal(scale, perspective)

@@ -22,17 +22,11 @@ import numpy as np
 from hairkit.arrays import Float64Array, frozen_array
 from hairkit.errors import FormatError, InputError
 from hairkit.io.capture_toml import CaptureFile, ViewEntry, read_capture_file
-from hairkit.io.photos import (
-    PHOTOS_TAKEN,
-    PhotoHeader,
-    focal_from_equivalent,
-    read_header,
-    read_photo,
-)
+from hairkit.io.photos import PHOTOS_TAKEN, PhotoHeader, read_header, read_photo
 from hairkit.io.video import is_video, read_video
 from hairkit.options import unknown_name
 from hairkit.storage import read_bytes
-from hairkit.types.capture import Capture, View
+from hairkit.types.capture import Capture, View, focal_from_equivalent
 from hairkit.types.edits import read_edits
 
 TURN = {

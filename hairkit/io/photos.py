@@ -29,6 +29,7 @@ from hairkit.io.exif import DAMAGE, Exif, quiet_pillow, read_exif
 from hairkit.io.heic import decode_heic, is_heic, read_heic_header
 from hairkit.io.png_chunks import SIGNATURE, check_png_data, scan_png
 from hairkit.storage import read_bytes
+from hairkit.types.capture import focal_from_equivalent
 
 MAX_PIXELS = 64_000_000
 """Pictures with more pixels than this are refused before they are decoded."""
@@ -38,8 +39,6 @@ PHOTO_KINDS = ("JPEG", "PNG", "WebP", "TIFF", "HEIC")
 """Kinds of pictures that are read."""
 PHOTOS_TAKEN = f"a {', '.join(PHOTO_KINDS[:-1])} or {PHOTO_KINDS[-1]} photo"
 """The same as words of a message."""
-FILM_DIAGONAL_MM = math.hypot(36.0, 24.0)
-"""Diagonal of the 35 mm film frame, to which equivalent focal lengths refer (CIPA DCG-001)."""
 _CROPPED = 0.02
 """Relative change of the aspect ratio since the picture was taken; more means it was cropped."""
 _KINDS = {
@@ -104,15 +103,6 @@ class PhotoHeader:
         if self.exif.focal_mm is not None and self.exif.pixels_per_mm is not None:
             return self.exif.focal_mm * self.exif.pixels_per_mm * sides[1] / taken[1]
         return None
-
-
-def focal_from_equivalent(focal_mm: float, width: int, height: int) -> float:
-    """Return the focal length in pixels of a 35 mm equivalent one: equal diagonal angle of view.
-
-    >>> round(focal_from_equivalent(47.83, 810, 1080))
-    1492
-    """
-    return focal_mm / FILM_DIAGONAL_MM * math.hypot(width, height)
 
 
 def read_header(path: str | os.PathLike[str]) -> PhotoHeader:

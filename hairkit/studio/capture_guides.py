@@ -17,9 +17,9 @@ from hairkit.arrays import Float64Array
 from hairkit.cameras.depth_raster import head_depth
 from hairkit.head_model.template import default_head
 from hairkit.io.capture_reader import TOP_DEG, TURN
-from hairkit.io.photos import focal_from_equivalent
 from hairkit.studio.framing import Guide
 from hairkit.types.camera import Camera
+from hairkit.types.capture import focal_from_equivalent
 
 WIDTH, HEIGHT = 360, 480
 """Pixels of the picture that is drawn; outlines are given in shares of it."""

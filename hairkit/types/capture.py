@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Self
@@ -16,6 +17,9 @@ from hairkit.types.parting import Parting
 from hairkit.types.person import Person
 from hairkit.types.preview import PHOTO_HEIGHT, Previewed, row
 from hairkit.types.turnaround import Turnaround
+
+FILM_DIAGONAL_MM = math.hypot(36.0, 24.0)
+"""Diagonal of the 35 mm film frame, to which equivalent focal lengths refer (CIPA DCG-001)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +97,10 @@ class View:
     def scale(self) -> float:
         """Pixels of the photo on disk along a pixel of `image`."""
         return (self.frame[2] - self.frame[0]) / self.width
+
+    def focal_or(self, equivalent: float) -> float:
+        """Return the focal length in pixels, if unknown that of a lens (35 mm equivalent, mm)."""
+        return self.focal_px or focal_from_equivalent(equivalent, *self.photo_size) / self.scale
 
     @property
     def centre(self) -> Float64Array:
@@ -227,6 +235,15 @@ class Capture(Previewed):
     def preview(self) -> UInt8Array | None:
         """Return the photos side by side, (H, W, 3) uint8 RGB."""
         return row([view.image for view in self.views], PHOTO_HEIGHT)
+
+
+def focal_from_equivalent(focal_mm: float, width: int, height: int) -> float:
+    """Return the focal length in pixels of a 35 mm equivalent one: equal diagonal angle of view.
+
+    >>> round(focal_from_equivalent(47.83, 810, 1080))
+    1492
+    """
+    return focal_mm / FILM_DIAGONAL_MM * math.hypot(width, height)
 
 
 def _turn_frame(

@@ -30,7 +30,6 @@ from hairkit.arrays import BoolArray, Float64Array, Int64Array
 from hairkit.errors import InputError
 from hairkit.imaging.hair_network import silhouette
 from hairkit.imaging.person_outline import Outline, trace_outline
-from hairkit.io.photos import focal_from_equivalent
 from hairkit.io.video import SUFFIXES
 from hairkit.types.face import Face
 from hairkit.types.person import Person
@@ -288,8 +287,7 @@ def _spread(values: Float64Array, shape: tuple[int, ...], where: Any) -> Float64
 
 def _level(views: Sequence[View]) -> Float64Array:
     """Return from what elevations (V,) level cameras see heads beside their axes."""
-    usual = [focal_from_equivalent(USUAL_LENS_MM, *view.photo_size) / view.scale for view in views]
-    focal = [view.focal_px or lens for view, lens in zip(views, usual, strict=True)]
+    focal = [view.focal_or(USUAL_LENS_MM) for view in views]
     down = [view.aim[1] - view.centre[1] for view in views]
     return np.asarray(np.degrees(np.arctan2(down, focal)), np.float64)
 

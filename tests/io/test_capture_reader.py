@@ -16,9 +16,8 @@ from hypothesis import strategies as st
 from hairkit.errors import InputError
 from hairkit.io.capture_reader import TURN, read_capture, read_files, sample_folder
 from hairkit.io.capture_toml import ViewEntry, read_capture_file, write_view_entries
-from hairkit.io.photos import focal_from_equivalent
 from hairkit.testing import striped_view
-from hairkit.types.capture import Capture
+from hairkit.types.capture import Capture, focal_from_equivalent
 
 POINTS = np.stack([np.linspace(5, 90, 68), np.linspace(9, 120, 68)], axis=1)
 

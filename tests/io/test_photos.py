@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from PIL import ImageFile
 
 from hairkit.errors import FormatError, InputError
-from hairkit.io.photos import focal_from_equivalent, read_drawing, read_header, read_photo
+from hairkit.io.photos import read_drawing, read_header, read_photo
+from hairkit.types.capture import focal_from_equivalent
 
 
 def scene_picture() -> np.ndarray:

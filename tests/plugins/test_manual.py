@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hairkit_plugins.manual import Options, estimate_scene
+from hairkit_plugins.manual import estimate_scene
 from scipy.spatial.transform import Rotation
 from turntable import turntable
 
-from hairkit.cameras.turntable import Turn
+from hairkit.cameras.turntable import NominalOptions, Turn
 from hairkit.errors import InputError
 
 
@@ -21,7 +21,7 @@ def test_the_head_is_seen_where_it_was_put() -> None:
     pose[:3, :3] = 1.2 * Rotation.from_rotvec([0.1, 0.2, -0.1]).as_matrix()
     pose[:3, 3] = [0.01, 0.05, -0.02]
     capture = replace(table.capture, head_pose=pose)
-    scene = estimate_scene(capture, table.masks, table.head, Options(distance=0.7))
+    scene = estimate_scene(capture, table.masks, table.head, NominalOptions(distance=0.7))
     focal = 42 / np.hypot(36, 24) * np.hypot(300, 400)
     points = table.head.vertices[::200]
     posed = points @ pose[:3, :3].T + pose[:3, 3]
@@ -34,4 +34,4 @@ def test_no_pose_is_an_error() -> None:
     """Without a pose the plugin says where to write it."""
     table = turntable(np.random.default_rng(0))
     with pytest.raises(InputError, match=r"capture\.toml"):
-        estimate_scene(table.capture, table.masks, table.head, Options())
+        estimate_scene(table.capture, table.masks, table.head, NominalOptions())
