@@ -88,11 +88,8 @@ class Options(FinishOptions):
     slide_sine: float = option(
         0.35, low=0, high=1, doc="Sine of the angle up to which strands slide on leaving; 0 never."
     )
-    slide_from: float = option(
-        1.0, low=0, high=10, doc="Internal distance from which strands slide."
-    )
     pull: float = option(
-        1.0, low=0, high=10, doc="Sine of the turn back for each unit beyond slide_from."
+        1.0, low=0, high=10, doc="Sine of the turn back for each unit of distance outside the hair."
     )
     turn_sine: float = option(
         0.7, low=0, high=1, doc="Sine above which strands turn along the shoulders; 1 never."
@@ -180,7 +177,6 @@ def grow(
         options.slide_sine,
         options.turn_sine,
         shoulders,
-        options.slide_from,
         options.pull,
         sign,
         float(early),  # of an integer, another kernel would be compiled
@@ -254,10 +250,8 @@ class Rules(NamedTuple):
     meet the shoulders turn along the surface."""
     shoulders: float
     """Height below which strands turn, metres."""
-    slide_from: float
-    """Internal distance from which strands slide."""
     pull: float
-    """Sine of the turn back for each unit of internal distance beyond `slide_from`."""
+    """Sine of the turn back for each unit of internal distance beyond the surface's, 1."""
     sign: float
     """1 to grow along the field, -1 against it."""
     early: float
@@ -326,8 +320,8 @@ def _grow_strand(
         if not make_unit(d):
             break
         stands = False
-        if rules.slide_sine > 0 and found[DISTANCE] >= rules.slide_from:
-            back = rules.pull * (found[DISTANCE] - rules.slide_from)
+        if rules.slide_sine > 0 and found[DISTANCE] >= 1:
+            back = rules.pull * (found[DISTANCE] - 1)
             leaves = found[DISTANCE] > LEFT and i < rules.early * limits[1]
             stands = _slide(volume, rules, back, p, d, i < limits[1], leaves)
         for axis in range(3):

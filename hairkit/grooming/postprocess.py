@@ -39,6 +39,9 @@ PATH_BLUR = 1.5
 """Standard deviation in points, along a strand, that keeps its axis smooth."""
 STIFF_SHARE = 0.05
 """Standard deviation of the smoothing along a strand, in shares of its length at most."""
+SHARPEST, AGAIN = 0.015, 5
+"""Metres of the least radius of a bend, and times that strands which bend more are smoothed again;
+99 of 100 true strands bend with more than 12 mm everywhere on the crown."""
 
 
 def finish(
@@ -59,7 +62,8 @@ def finish(
 def _smooth(strands: Strands, tied: TiedHair, stiffness: float) -> Strands:
     """Return strands of equal point counts without sudden bends; braids stay as they are.
 
-    Growth bends at once where it meets a surface or a tie, stiff hair over some millimetres.
+    Growth bends at once where it meets a surface or a tie, stiff hair over some millimetres. What
+    still bends too sharply, as strands that rise in a parting do, is smoothed again and more.
     """
     if not len(strands) or not stiffness:
         return strands
@@ -68,7 +72,19 @@ def _smooth(strands: Strands, tied: TiedHair, stiffness: float) -> Strands:
         plaited = np.array([False, *(tail.crossing > 0 for tail in tied.tails)])
         sigma[plaited[strands.group]] = 0
     points = smooth_curves(strands.points.reshape(len(strands), -1, 3), sigma)
+    for _ in range(AGAIN):
+        bent = np.flatnonzero(_sharpest_bends(points) > 1 / SHARPEST)
+        points[bent] = smooth_curves(points[bent], sigma[bent])
+        sigma[bent] *= np.sqrt(2)  # twice the variance
     return replace(strands, points=points.reshape(-1, 3))
+
+
+def _sharpest_bends(points: Float32Array) -> Float32Array:
+    """Return (S,) the greatest curvature of curves (S, m, 3) of about equal steps, 1 / metres."""
+    steps = np.diff(points, axis=1)
+    lengths = np.maximum(np.linalg.norm(steps, axis=2), 1e-9)
+    turns = np.linalg.norm(np.diff(steps / lengths[..., None], axis=1), axis=2)
+    return np.asarray(turns.max(axis=1, initial=0) / lengths.mean(axis=1), np.float32)
 
 
 def make_room(strands: Strands, waves: Waves, hull: Hull) -> Strands:

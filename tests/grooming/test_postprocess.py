@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from hairkit.arrays import unit_vectors
+from hairkit.grooming import postprocess
 from hairkit.grooming.head_collision import FULL_AFTER
 from hairkit.grooming.postprocess import FinishOptions, finish
 from hairkit.testing import ball_head, combed_field, scalp_roots, shell_hull
@@ -70,3 +71,30 @@ def test_stiff_strands_bend_over_some_millimetres() -> None:
     np.testing.assert_allclose(result.tips, strands.tips, atol=1e-6)
     limp = finish(strands, Waves(), TiedHair(), shell_hull(), FIELD, replace(PLAIN, stiffness=0.0))
     np.testing.assert_array_equal(limp.points, strands.points)
+
+
+def hairpins() -> Strands:
+    """Four strands that rise 2 cm out of the ball, turn back at once and run 16 cm along it."""
+    t = np.linspace(0, 0.2, 101)[:, None]
+    rise = np.minimum(t, 0.02) - np.clip(t - 0.02, 0, 0.02)
+    way = rise * [0, 1, 0] + np.maximum(t - 0.02, 0) * [0.15, 0, 0] + [0.0, 0.2, 0.0]
+    way += np.maximum(t - 0.04, 0) * [0.85, 0, 0]
+    return Strands(np.tile(way, (4, 1)).astype(np.float32), np.arange(5) * 101)
+
+
+def test_strands_that_rise_and_turn_back_bend_no_sharper_than_hair() -> None:
+    """A hairpin becomes an arc of the least radius that stands less far off; other strands keep
+    what one smoothing made of them."""
+    pins, radius = hairpins(), postprocess.SHARPEST
+    result = finish(pins, Waves(), TiedHair(), shell_hull(), FIELD, PLAIN)
+    even = result.resampled(101)
+    step = even.lengths() / 100
+    assert np.radians(sharpest(even)).max() < 1.1 * (step / radius).max()
+    assert result.points[:, 1].max() < pins.points[:, 1].max() - 0.008
+    np.testing.assert_allclose(result.tips, pins.tips, atol=1e-6)
+    others = bristles().resampled(101)
+    both = Strands(np.concatenate([pins.points, others.points]), np.arange(len(others) + 5) * 101)
+    alone, beside = (
+        finish(each, Waves(), TiedHair(), shell_hull(), FIELD, PLAIN) for each in (others, both)
+    )
+    np.testing.assert_array_equal(beside.select(np.arange(4, len(both))).points, alone.points)

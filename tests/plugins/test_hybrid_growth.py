@@ -217,13 +217,13 @@ def growth_twin(
             d = keep * d + (1 - keep) * found[:3] / size
         d = d / np.linalg.norm(d)
         stands = False
-        if found[3] >= options.slide_from:
+        if found[3] >= 1:
             probes = p + GRID.spacing * np.concatenate([np.eye(3), -np.eye(3)])
             level = GRID.sample(values, probes)[:, 3].astype(np.float64)
             normal = (level[:3] - level[3:]) / np.linalg.norm(level[:3] - level[3:])
             stands = d @ normal >= options.slide_sine and normal[1] > BELOW
             if i < free and d @ normal < options.slide_sine:
-                back = options.pull * (found[3] - options.slide_from)
+                back = options.pull * (found[3] - 1)
                 d = d - (max(d @ normal, 0) + back) * normal
                 d = d / np.linalg.norm(d)
         p = p + options.step * d
@@ -239,7 +239,7 @@ def test_growth_equals_its_readable_twin(seed: int) -> None:
     axis = rng.normal(size=3)
     direction = (np.cross(axis, at) + 0.2 * axis + at).astype(np.float32)
     distance = (0.5 + 6 * np.linalg.norm(at, axis=-1)).astype(np.float32)
-    options = replace(FREE, slide_sine=0.6, slide_from=0.8, bound=1.4, inertia=0.5, blind=0.01)
+    options = replace(FREE, slide_sine=0.6, bound=1.4, inertia=0.5, blind=0.01)
     starts = rng.normal(0, 0.02, (12, 3)).astype(np.float32)
     field = constant((0, 1, 0))
     found = grow(
