@@ -9,8 +9,9 @@ that sees the texel best, so that seams neither show nor blur.
 
 The light of the photos is taken out of the seen skin (`hairkit.head_model.delighting`). What then
 differs from the face in colour, such as strands that masks miss, the edge of their shadow and
-collars, counts as unseen. What is unseen is taken from its mirror image where the texture
-coordinates are symmetric, then from the head's own skin in the mean tone of the seen.
+collars, counts as unseen, and so do brows and mouth beside what the best view of the face shows of
+them. What is unseen is taken from its mirror image where the texture coordinates are symmetric,
+then from the head's own skin in the mean tone of the seen.
 """
 
 from __future__ import annotations
@@ -55,8 +56,8 @@ MARGIN, HAIR_MARGIN = 0.004, 0.008
 exact, and fine strands and their shadow lie beside the mask."""
 SHARPNESS = 8
 """Power of the weights from which details are taken: nearly the best view alone."""
-WELL, OTHER_FACES = 0.3, 1e-6
-"""Weight from which a view sees the face well, and factor of the weights of others there."""
+WELL, WELL_FEATURES = 0.3, 0.12
+"""Weights from which one view shows the face alone, and its features."""
 BLOWN, BLOWN_FADE = 250.0, 6.0
 """Levels of 255 from which a pixel has lost its colour, and over which its weight fades."""
 LEAST_SHARE = 0.01
@@ -118,11 +119,13 @@ def photograph_skin(capture: Capture, scene: Scene, masks: Sequence[Mask]) -> Sk
         [view.coarse[::STEP, ::STEP] for view in views],
         [view.weight[::STEP, ::STEP] for view in views],
     )
-    blended, seen = _blend(views, photos, gains, features)
+    symmetric = _is_symmetric(surface)
+    views = _one_face(views, features, symmetric)
+    blended, seen = _blend(views, photos, gains)
     del views  # as much memory as the map itself
     blended = _delight(blended, seen, surface, features)
     seen = _certain(blended, seen, features)
-    if _is_symmetric(surface):
+    if symmetric:
         blended, seen = _mirror(blended, seen)
     pixels = _fill(blended, seen, surface, features, _own_skin(scene.head))
     maps = scene.head.maps or SkinMaps()
@@ -139,6 +142,15 @@ def _skin_alone(views: Sequence[_Seen], features: BoolArray) -> list[_Seen]:
         skin = np.where(features, 1, like_skin(view.coarse, view.weight))
         kept.append(view._replace(weight=(view.weight * skin).astype(np.float32)))
     return kept
+
+
+def _one_face(views: Sequence[_Seen], features: BoolArray, symmetric: bool) -> list[_Seen]:
+    """Return the views with the face of the one that sees its features best, where it sees them or
+    their mirror image: cameras are off by millimetres, and two views would give two mouths."""
+    face = max(views, key=lambda view: float((view.weight * features).sum()))
+    known = np.maximum(face.weight, face.weight[:, ::-1] * (features & symmetric))
+    others = np.clip(1 - known / np.where(features, WELL_FEATURES, WELL), 0, 1).astype(np.float32)
+    return [v if v is face else v._replace(weight=v.weight * others) for v in views]
 
 
 def _features(head: Head, surface: _Surface) -> BoolArray:
@@ -253,19 +265,12 @@ def _usable(camera: Camera, mask: Mask, photo: UInt8Array) -> Float32Array:
 
 
 def _blend(
-    views: Sequence[_Seen], photos: Sequence[UInt8Array], gains: Float64Array, features: BoolArray
+    views: Sequence[_Seen], photos: Sequence[UInt8Array], gains: Float64Array
 ) -> tuple[Float32Array, Float32Array]:
-    """Return (S, S, 3) the blended colours and (C, C) the weight of all views together.
-
-    The face is of the view that sees its features best, as far as it sees it well: cameras are off
-    by millimetres, and two views would give two mouths.
-    """
+    """Return (S, S, 3) the blended colours and (C, C) the weight of all views together."""
     total = np.sum([view.weight for view in views], axis=0)
     best = np.maximum(np.max([view.weight for view in views], axis=0), LEAST)
-    face = int(np.argmax([(view.weight * features).sum() for view in views]))
-    others = np.clip(1 - views[face].weight / WELL, OTHER_FACES, 1)
-    shares = [others * (view.weight / best) ** SHARPNESS for view in views]
-    shares[face] /= others
+    shares = [(view.weight / best) ** SHARPNESS for view in views]
     shares = [np.where(share < LEAST_SHARE, 0, share) for share in shares]
     share_sum = np.maximum(np.sum(shares, axis=0), LEAST)
     shares = [np.asarray(share / share_sum, np.float32) for share in shares]
@@ -345,8 +350,8 @@ def _is_symmetric(surface: _Surface) -> bool:
 def _mirror(blended: Float32Array, seen: Float32Array) -> tuple[Float32Array, Float32Array]:
     """Return colours, in their place, and weights, completed by those of the other side."""
     other = seen[:, ::-1]
-    lacking = _fade(seen < LEAST_SEEN)
-    lacking = np.where(seen < LEAST_SEEN, 1.0, lacking) * (other >= LEAST_SEEN)
+    unseen = seen < LEAST_SEEN
+    lacking = np.where(unseen, 1.0, _fade(unseen)) * (other >= LEAST_SEEN)
     share = lacking.astype(np.float32)
     for rows in _strips():
         mirrored = blended[rows, ::-1] - blended[rows]
@@ -365,8 +370,7 @@ def _own_skin(head: Head) -> UInt8Array:
     """Return (S, S, 3) the head's own albedo; grey without one."""
     if head.maps is None or head.maps.albedo is None:
         return np.full((SIZE, SIZE, 3), 128, np.uint8)
-    pixels = head.maps.albedo.pixels
-    return np.asarray(cv2.resize(pixels, (SIZE, SIZE), interpolation=cv2.INTER_LINEAR), np.uint8)
+    return np.asarray(cv2.resize(head.maps.albedo.pixels, (SIZE, SIZE)), np.uint8)
 
 
 def _fill(

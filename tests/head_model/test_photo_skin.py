@@ -140,9 +140,8 @@ def test_a_view_that_sees_next_to_nothing_changes_nothing() -> None:
     """A view whose weight vanishes beside another's neither fails nor shows in the colours."""
     photo, whole = grey_view()
     faint = whole._replace(weight=1e-9 * whole.weight, coarse=whole.coarse + 100)
-    features = np.zeros(whole.weight.shape, np.bool_)
-    alone, _ = photo_skin._blend([whole], [photo], np.ones((1, 3)), features)
-    both, _ = photo_skin._blend([whole, faint], [photo, photo + 100], np.ones((2, 3)), features)
+    alone, _ = photo_skin._blend([whole], [photo], np.ones((1, 3)))
+    both, _ = photo_skin._blend([whole, faint], [photo, photo + 100], np.ones((2, 3)))
     np.testing.assert_allclose(both, alone, atol=1e-3)
 
 
@@ -164,12 +163,30 @@ def test_the_face_is_of_one_view() -> None:
     features[200:300, 200:300] = True
     front = np.where(features, 1.2, 0.8).astype(np.float32)
     shown = aside._replace(weight=front, coarse=spotted.astype(np.float32))
-    alone, _ = photo_skin._blend([shown], [spotted], np.ones((1, 3)), features)
-    both, _ = photo_skin._blend([shown, aside], [spotted, photo], np.ones((2, 3)), features)
+    alone, _ = photo_skin._blend([shown], [spotted], np.ones((1, 3)))
+    views = photo_skin._one_face([shown, aside], features, False)
+    both, _ = photo_skin._blend(views, [spotted, photo], np.ones((2, 3)))
     spots, wanted = (
         np.abs(np.diff(colours[..., 0], axis=0)).max(axis=0) for colours in (both, alone)
     )
     np.testing.assert_allclose(spots, wanted, rtol=0.1)
+
+
+@pytest.mark.parametrize("symmetric", [True, False])
+def test_half_a_brow_comes_from_its_mirror_image_not_from_another_view(symmetric: bool) -> None:
+    """Where the face's view sees the other half of the features, no view shows this one; beside
+    the features, and on heads without symmetry, other views do."""
+    _, aside = grey_view()
+    size = photo_skin.COARSE
+    features = np.zeros((size, size), np.bool_)
+    features[200:300, 100:-100] = True
+    half = np.where(np.arange(size) < size // 2, 3.0, 0.0) * np.ones((size, 1))
+    shown = aside._replace(weight=half.astype(np.float32))
+    other = photo_skin._one_face([aside, shown], features, symmetric)[0].weight
+    assert not other[:, : size // 2].any()
+    right = other[:, size // 2 :]
+    assert right[~features[:, size // 2 :]].all()
+    assert right[features[:, size // 2 :]].any() != symmetric
 
 
 def test_gains_make_views_agree() -> None:
