@@ -25,14 +25,13 @@ SKIN = (0.42, 0.24, 0.17)
 """Linear RGB of skin."""
 SCALP_TINT = 0.75
 """Weight of the hair colour on the scalp."""
-MAP_UNITS = {"albedo": 6, "normal": 7, "roughness": 8}
-"""Texture units of a head's maps, which no other pictures are bound to."""
-MAP_UNIFORMS = {
-    "albedo": ("u_albedo", "u_textured"),
-    "normal": ("u_normals", "u_has_normals"),
-    "roughness": ("u_rough", "u_has_rough"),
+MAPS = {
+    "albedo": (6, "u_albedo", "u_textured"),
+    "normal": (7, "u_normals", "u_has_normals"),
+    "roughness": (8, "u_rough", "u_has_rough"),
 }
-"""Sampler of each map, and the uniform that says whether there is one."""
+"""A head's maps: texture unit, which no other picture is bound to, sampler, and the uniform that
+says whether there is one."""
 
 
 @dataclass(frozen=True)
@@ -56,10 +55,11 @@ class Solid:
 
 
 def head_solid(head: Head, material: HairMaterial) -> Solid:
-    """Return the head with skin colours and a scalp tinted with the colour of the hair."""
+    """Return the head with skin colours, its scalp tinted with the colour of the hair there."""
     albedo = None if head.maps is None else head.maps.albedo
     skin = np.array(SKIN, np.float32)
-    scalp = np.clip(head.scalp, 0, 1)[:, None] * np.float32(SCALP_TINT)
+    grown = head.scalp if head.density is None else head.scalp * head.density
+    scalp = np.clip(grown, 0, 1)[:, None] * np.float32(SCALP_TINT)
     colours = (1 - scalp) * skin + scalp * (0.5 * material.root_colour)
     if albedo is not None:
         colours = colours / skin  # the picture has the skin's colour
@@ -99,7 +99,7 @@ def upload_maps(gl: Renderer, solid: object) -> Iterator[dict[str, moderngl.Text
     uploaded = {}
     try:
         for kind, picture in maps.present().items():
-            if kind in MAP_UNITS:
+            if kind in MAPS:
                 uploaded[kind] = _upload(gl, picture)
         yield uploaded
     finally:
@@ -110,10 +110,10 @@ def upload_maps(gl: Renderer, solid: object) -> Iterator[dict[str, moderngl.Text
 def bind_maps(maps: Mapping[str, moderngl.Texture]) -> dict[str, Any]:
     """Bind the pictures, and return the uniforms that name them."""
     uniforms: dict[str, Any] = {}
-    for kind, (sampler, present) in MAP_UNIFORMS.items():
-        uniforms |= {sampler: MAP_UNITS[kind], present: float(kind in maps)}
+    for kind, (unit, sampler, present) in MAPS.items():
+        uniforms |= {sampler: unit, present: float(kind in maps)}
         if kind in maps:
-            maps[kind].use(MAP_UNITS[kind])
+            maps[kind].use(unit)
     return uniforms
 
 

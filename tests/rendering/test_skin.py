@@ -12,12 +12,15 @@ from skin_twins import below, diffuse, distribution, fresnel, reflect
 
 from hairkit.arrays import Float64Array, UInt8Array
 from hairkit.errors import InputError
+from hairkit.head_model.template import default_head
 from hairkit.rendering import Solid, draw_views
 from hairkit.rendering.context import renderer, shader_source
+from hairkit.rendering.head import head_solid
 from hairkit.rendering.light import Lights
 from hairkit.rendering.skin_lobe import TAPS, diffusion_kernel
 from hairkit.rendering.skin_passes import _diffuse
 from hairkit.types.camera import Camera
+from hairkit.types.groom import HairMaterial
 from hairkit.types.skin import SkinMaps, Texture
 from hairkit.types.skin_look import LOBES, SkinLook
 from hairkit.types.strands import Strands
@@ -238,3 +241,15 @@ def test_cloth_has_neither_layer() -> None:
     rough = {"lobe": "beckmann", "roughness": 0.2}
     assert (plane() != plane(**rough)).any()
     np.testing.assert_array_equal(plane(scatter=0.0), plane(scatter=0.0, **rough))
+
+
+def test_the_scalp_is_tinted_where_hair_grows_alone() -> None:
+    """A bald part has the colours of the face; a head of unknown density is tinted all over."""
+    head, material = default_head(), HairMaterial()
+    scalp, bald = head.scalp == 1, head.vertices[:, 0] > 0
+    whole = head_solid(head, material).colours
+    half = head_solid(replace(head, density=np.where(bald, 0, 1)), material).colours
+    face = whole[head.scalp == 0]
+    assert (half[scalp & bald] == face[0]).all()
+    np.testing.assert_array_equal(half[~bald], whole[~bald])
+    assert not np.isclose(whole[scalp], face[0]).all(axis=1).any()
