@@ -231,31 +231,22 @@ class SignedVolume(NamedTuple):
 
 
 class Rules(NamedTuple):
-    """The options in the units of the growth."""
+    """The options in the units of the growth; the others are as in `Options` and `grow`."""
 
     step: float
-    """Metres (delta)."""
     bound: float
-    """Internal distance at which a strand has left the hair."""
     inertia: float
-    """Share of the previous direction in the next one."""
     blind_steps: int
     """Steps from the root on which nothing ends a strand."""
     patience_steps: int
     """Steps in a row outside the hair that do not end a strand."""
     slide_sine: float
-    """Of the angle to the hair's surface, below which a strand slides along it; 0 for never."""
     turn_sine: float
-    """Of the angle between the surface's normal and the way to the tips, above which strands that
-    meet the shoulders turn along the surface."""
     shoulders: float
     """Height below which strands turn, metres."""
     pull: float
-    """Sine of the turn back for each unit of internal distance beyond the surface's, 1."""
     sign: float
-    """1 to grow along the field, -1 against it."""
     early: float
-    """Share of the way on which no strand ends by standing out of the hair."""
 
 
 @compiled_with(allocates=True)

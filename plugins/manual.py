@@ -18,6 +18,5 @@ def estimate_scene(
             "the capture gives no head pose for the plugin 'manual';"
             " add [head] to capture.toml or use the plugin 'silhouette'"
         )
-    cameras = nominal_cameras(capture, options)
     names = tuple(view.name for view in capture.views)
-    return move_head(Scene(names, cameras, head), capture.head_pose)
+    return move_head(Scene(names, nominal_cameras(capture, options), head), capture.head_pose)

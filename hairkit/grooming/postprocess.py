@@ -40,8 +40,8 @@ PATH_BLUR = 1.5
 STIFF_SHARE = 0.05
 """Standard deviation of the smoothing along a strand, in shares of its length at most."""
 SHARPEST, AGAIN = 0.015, 5
-"""Metres of the least radius of a bend, and times that strands which bend more are smoothed again;
-99 of 100 true strands bend with more than 12 mm everywhere on the crown."""
+"""Metres of the least radius of a bend, and times that sharper ones are smoothed again. Of true
+strands 99 of 100 bend with more than 12 mm on the crown."""
 
 
 def finish(
@@ -62,18 +62,20 @@ def finish(
 def _smooth(strands: Strands, tied: TiedHair, stiffness: float) -> Strands:
     """Return strands of equal point counts without sudden bends; braids stay as they are.
 
-    Growth bends at once where it meets a surface or a tie, stiff hair over some millimetres. What
-    still bends too sharply, as strands that rise in a parting do, is smoothed again and more.
+    Growth bends at once where it meets a surface or a tie, stiff hair over some millimetres. Loose
+    strands that still bend too sharply, as in a parting, are smoothed again and more.
     """
     if not len(strands) or not stiffness:
         return strands
     sigma = np.minimum(stiffness / np.maximum(strands.lengths(), 1e-9), STIFF_SHARE)
+    loose = np.ones(len(strands), np.bool_)
     if strands.group is not None:
+        loose = strands.group == 0
         plaited = np.array([False, *(tail.crossing > 0 for tail in tied.tails)])
         sigma[plaited[strands.group]] = 0
     points = smooth_curves(strands.points.reshape(len(strands), -1, 3), sigma)
     for _ in range(AGAIN):
-        bent = np.flatnonzero(_sharpest_bends(points) > 1 / SHARPEST)
+        bent = np.flatnonzero((_sharpest_bends(points) > 1 / SHARPEST) & loose)
         points[bent] = smooth_curves(points[bent], sigma[bent])
         sigma[bent] *= np.sqrt(2)  # twice the variance
     return replace(strands, points=points.reshape(-1, 3))

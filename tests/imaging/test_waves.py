@@ -10,10 +10,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import ndimage
 
 from hairkit.arrays import Float64Array
 from hairkit.grooming.wind_waves import add_waves
-from hairkit.imaging.waves import COILS, USUAL_RADIUS, measure_waves, remove_slant
+from hairkit.imaging.waves import (
+    COILS,
+    LARGEST_SLOPE,
+    USUAL_RADIUS,
+    measure_waves,
+    remove_slant,
+)
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture, View
 from hairkit.types.mask import HAIR, Mask
@@ -207,6 +214,32 @@ def test_hair_that_runs_in_all_directions_alike_is_tightly_coiled(rng: np.random
         np.where(np.arange(masks[0].labels.size) < 9, HAIR, 0).reshape(maps[0].angle.shape), True
     )
     assert measure_waves(capture, maps, [*masks[:1], *[bald] * 3], cameras) != COILS
+
+
+def locks(ways: Float64Array) -> View:
+    """Return a photo of locks 2.5 cm wide with strands side by side, at these angles."""
+    y, x = np.mgrid[: round(HEIGHT * PIXELS_PER_METRE), : round(WIDTH * PIXELS_PER_METRE)]
+    edge = 0.025 * PIXELS_PER_METRE
+    lock = (x // edge + 8 * (y // edge)).astype(int) % len(ways)
+    strands = ndimage.gaussian_filter1d(
+        np.random.default_rng(0).normal(size=5000), 1.5, mode="wrap"
+    )
+    way = ways[lock]
+    across = 100 * lock + y * np.cos(way) - x * np.sin(way)
+    shade = np.interp(across % 5000, np.arange(5000), strands)
+    grey = np.clip(90 + 40 * shade / strands.std(), 0, 255).astype(np.uint8)
+    return View("front", 0.0, np.repeat(grey[..., None], 3, axis=-1))
+
+
+def test_locks_in_all_directions_are_no_coils() -> None:
+    """Strands that lie side by side have no steep curls, however their locks lie: neither in a turn
+    nor in one photo, where no pitch is seen."""
+    rng = np.random.default_rng(1)
+    every = locks(rng.permutation(np.linspace(0, np.pi, 80, endpoint=False)))
+    assert measure_waves(*views_of(every)) != COILS
+    flat = locks(rng.permutation(np.linspace(-0.5, 0.5, 80)))
+    waves = measure_waves(*curtains(flat))
+    assert 2 * np.pi * waves.radius == pytest.approx(LARGEST_SLOPE * waves.pitch)
 
 
 def test_too_little_hair_is_not_measured() -> None:
