@@ -29,15 +29,14 @@ BEARINGS = 72
 """Columns of the table, from behind over the subject's right, the front and the left."""
 PROBE, FARTHEST = 0.002, 0.3
 """Distance of the points looked up along an outline's radius, and the last one's, metres."""
-NEAR_BEARING = 4.0
+NEAR_BEARING, EVEN = 4.0, 0.04
 """Concentration (von Mises) of an outline's say about other bearings: half of it 34 degrees away.
-"""
+Metres along the height over which hair is evened far from all outlines, where locks may bulge."""
 MIRRORED = 0.05
 """Weight of a mirrored outline: it decides only where no other is near."""
 HANGS = 0.499
-"""Share of the outlines, by nearness, that have hair at a height from which there is some: hair of
-one side only reaches to the middle of the back.
-"""
+"""Least share of the outlines, by nearness, that have hair at a height where there is some: hair of
+one side alone reaches to the middle of the back."""
 SMOOTH = 0.008
 """Standard deviation along the height over which outlines are smoothed, metres."""
 LYING = 0.015
@@ -46,10 +45,8 @@ CHIN = -0.15
 """Height below the head's middle down to which outlines show how thick hair hangs, metres: further
 down it spreads over the shoulders."""
 CUT_OFF = 0.1
-"""How far hair goes on that the picture's lower edge cuts off, metres. Fronts of eight heads, cut
-off below the chin, have F at 4 mm/40 of 55.9 (length 0.55) without it, 61.0 (0.71) with 0.075, 60.6
-(0.75) with 0.1, 58.1 (0.85) with 0.15, 45.9 (1.51) with 0.3.
-"""
+"""How far hair goes on that the picture's lower edge cuts off, metres. F at 4 mm/40 of eight fronts
+cut off below the chin (length): without it 55.9 (0.55), 60.6 (0.75), and with 0.15 58.1 (0.85)."""
 FACE = 0.4
 """Cosine of the bearing up to which an outline is that of the face."""
 
@@ -211,7 +208,7 @@ def _between(
 ) -> tuple[Float64Array, BoolArray]:
     """Return how far hair reaches beyond the support (BEARINGS, rows), and whether any hangs."""
     bearings = _bearings()
-    thick, shown, total = np.zeros((3, *support.shape))
+    thick, shown, total, nearest = np.zeros((4, *support.shape))
     for mirror, weight in ((1, 1.0), (-1, MIRRORED)):
         for side, outline in sides:
             has = (outline > 0).astype(float)
@@ -220,10 +217,14 @@ def _between(
                 has * (outline - support[_column(mirror * side)]), SMOOTH / STEP
             )
             near = weight * np.exp(NEAR_BEARING * (np.cos(bearings - mirror * side) - 1))[:, None]
+            nearest = np.maximum(nearest, near)
             thick += near * off
             shown += near * soft
             total += near * np.where(_tells_nothing(side), soft, 1.0)
     thick = thick / np.maximum(shown, 1e-9)
+    both = np.stack([thick, shown > 0]).astype(float)
+    even, known = ndimage.gaussian_filter1d(both, EVEN / STEP)
+    thick += (1 - nearest) * (even / np.maximum(known, 1e-9) - thick)
     below = _heights() < CHIN
     hung = thick[:, ~below & (_heights() < 0)].max(axis=1, keepdims=True)
     thick[:, below] = np.minimum(thick[:, below], hung)

@@ -64,6 +64,21 @@ def test_hair_behind_is_as_thick_as_beside() -> None:
     assert behind[:, 1].min() == pytest.approx(LOW, abs=0.015)
 
 
+def test_locks_that_bulge_beside_a_view_bulge_less_behind_the_head() -> None:
+    """Hair far from every outline is as thick as they are over some centimetres together."""
+    heights = shell._heights()
+    support = np.full((shell.BEARINGS, len(heights)), 0.09)
+    bulge = np.where(np.abs(heights + 0.04) < 0.02, 0.04, 0.0)
+    sides = [(side, 0.09 + THICK + bulge) for side in (-np.pi / 2, np.pi / 2)]
+    thick, there = shell._between(sides, support)
+    assert there.all()
+    row = int(np.abs(heights + 0.04).argmin())
+    beside, behind = thick[shell._column(np.pi / 2), row], thick[0, row]
+    assert beside == pytest.approx(THICK + 0.04, abs=0.002)
+    assert behind < THICK + 0.02
+    assert thick[0, -1] == pytest.approx(THICK, abs=0.002)
+
+
 def test_hair_that_is_seen_lies_between_the_depths_that_are_told(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
