@@ -231,7 +231,7 @@ class SignedVolume(NamedTuple):
 
 
 class Rules(NamedTuple):
-    """The options in the units of the growth; the others are as in `Options` and `grow`."""
+    """The options in the units of the growth; those without a text as in `Options` and `grow`."""
 
     step: float
     bound: float

@@ -46,7 +46,7 @@ CHIN = -0.15
 down it spreads over the shoulders."""
 CUT_OFF = 0.1
 """How far hair goes on that the picture's lower edge cuts off, metres. F at 4 mm/40 of eight fronts
-cut off below the chin (length): without it 55.9 (0.55), 60.6 (0.75), and with 0.15 58.1 (0.85)."""
+cut off below the chin (length): 55.9 (0.55) without, 60.6 (0.75) here, 58.1 (0.85) with 0.15."""
 FACE = 0.4
 """Cosine of the bearing up to which an outline is that of the face."""
 
