@@ -11,8 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hairkit import Camera, Capture, Head, Mask, Scene, hookimpl
-from hairkit.arrays import Float64Array
+from hairkit import Capture, Head, Mask, Scene, hookimpl
 from hairkit.cameras.similarity import fit_similarity, triangulate
 from hairkit.cameras.turntable import NominalOptions, nominal_cameras
 from hairkit.errors import InputError
@@ -37,42 +36,23 @@ def estimate_scene(
     capture: Capture, masks: tuple[Mask, ...], head: Head, options: Options
 ) -> Scene:
     """Return the nominal turn in the frame of the head, which landmarks place in it."""
-    pixels, known = _gather_landmarks(capture)
+    seen = [i for i, view in enumerate(capture.views) if view.landmarks is not None]
+    if len(seen) < 2:
+        raise InputError(
+            f"landmarks are known in {len(seen)} views, the plugin 'landmarks' needs 2"
+            " or more; add landmarks.json or use the plugin 'silhouette'"
+        )
     if head.landmark_vertices is None:
         raise InputError(
             "the head has no landmark_vertices for the plugin 'landmarks'; use the plugin 'manual'"
         )
+    pixels = np.stack([np.asarray(capture.views[i].landmarks) for i in seen])
     cameras = nominal_cameras(capture, options)
     weights = np.where(np.arange(LANDMARKS) < JAW_LANDMARKS, options.jaw_weight, 1.0)
-    points = triangulate(cameras, pixels, np.broadcast_to(known[:, None], pixels.shape[:2]))
+    points = triangulate([cameras[i] for i in seen], pixels)
     scene_from_head = fit_similarity(head.vertices[head.landmark_vertices], points, weights)
     to_head = scene_from_head.inverse()
     fitted = tuple(to_head.moved_camera(camera) for camera in cameras)
-    residual = _residual_px(fitted, to_head.apply(points), pixels, known)
+    gap = np.stack([fitted[i].project(to_head.apply(points)) for i in seen]) - pixels
+    residual = float(np.sqrt(np.mean(np.sum(gap**2, axis=-1))))
     return Scene(tuple(view.name for view in capture.views), fitted, head, residual)
-
-
-def _gather_landmarks(capture: Capture) -> tuple[Float64Array, Float64Array]:
-    """Return landmarks (V, 68, 2), zero where unknown, and 1 for views that have them (V,)."""
-    known = np.array([float(view.landmarks is not None) for view in capture.views])
-    if known.sum() < 2:
-        raise InputError(
-            f"landmarks are known in {int(known.sum())} views, the plugin 'landmarks' needs 2"
-            " or more; add landmarks.json or use the plugin 'silhouette'"
-        )
-    pixels = np.zeros((len(known), LANDMARKS, 2))
-    for index, view in enumerate(capture.views):
-        if view.landmarks is not None:
-            pixels[index] = view.landmarks
-    return pixels, known
-
-
-def _residual_px(
-    cameras: tuple[Camera, ...], points: Float64Array, pixels: Float64Array, known: Float64Array
-) -> float:
-    misfit = [
-        camera.project(points) - seen
-        for camera, seen, has in zip(cameras, pixels, known, strict=True)
-        if has
-    ]
-    return float(np.sqrt(np.mean(np.sum(np.square(misfit), axis=-1))))

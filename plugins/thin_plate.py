@@ -81,13 +81,13 @@ def fit_head(capture: Capture, masks: tuple[Mask, ...], scene: Scene, options: O
 def _bend_to_landmarks(capture: Capture, scene: Scene, options: Options) -> Head:
     head = scene.head
     seen = [view.landmarks is not None for view in capture.views]
-    if sum(seen) < 2 or head.landmark_vertices is None:
+    if not any(seen) or head.landmark_vertices is None:
         return head
     pixels = np.stack([view.landmarks for view in capture.views if view.landmarks is not None])
     cameras = [camera for camera, has in zip(scene.cameras, seen, strict=True) if has]
     less = (1 + STEEP * steepness(capture.views)[seen]) ** -2.0
-    points = triangulate(cameras, pixels, np.repeat(less[:, None], LANDMARKS, axis=1))
     source = head.vertices[head.landmark_vertices].astype(np.float64)
+    points = triangulate(cameras, pixels, np.repeat(less[:, None], LANDMARKS, axis=1), source)
     # scalp behind the ears' plane, of which the landmarks know nothing
     behind = head.vertices[:, 2] < np.median(head.vertices[:, 2])
     held = spread_vertices(head, np.flatnonzero((head.scalp > 0.5) & behind), ANCHORS)

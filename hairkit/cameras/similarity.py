@@ -14,8 +14,8 @@ from hairkit.types.camera import Camera
 from hairkit.types.scene import Scene
 
 MIN_LANDMARKS = 3
-
-
+HOLD = 0.01
+"""Weight of the start of a point, of one for each ray."""
 COLLINEAR = 1e-3
 """Points whose second spread is below this share of the first lie on a line."""
 
@@ -105,17 +105,21 @@ def _check_spread(centred: Float64Array) -> None:
 
 
 def triangulate(
-    cameras: Sequence[Camera], pixels: npt.ArrayLike, weights: npt.ArrayLike | None = None
+    cameras: Sequence[Camera],
+    pixels: npt.ArrayLike,
+    weights: npt.ArrayLike | None = None,
+    start: npt.ArrayLike | None = None,
 ) -> Float64Array:
     """Return the points (N, 3) nearest to the rays through `pixels` (V, N, 2) of all views.
 
     `weights` (V, N) is 0 where a view does not know the point. A point that fewer than two views
-    know is NaN.
+    know is NaN; with `start` (N, 3) it moves from there only as far as its ray, if any, asks for.
     """
     seen = np.asarray(pixels, np.float64)
     weight = np.ones(seen.shape[:2]) if weights is None else np.asarray(weights, np.float64)
-    normal = np.zeros((seen.shape[1], 3, 3))
-    right = np.zeros((seen.shape[1], 3))
+    hold, first = (0.0, 0.0) if start is None else (HOLD, np.asarray(start, np.float64))
+    normal = np.zeros((seen.shape[1], 3, 3)) + hold * np.eye(3)
+    right = np.zeros((seen.shape[1], 3)) + hold * first
     for camera, view_pixels, view_weight in zip(cameras, seen, weight, strict=True):
         origin, direction = camera.rays(np.where(view_weight[:, None] > 0, view_pixels, 0.0))
         across = np.eye(3) - direction[:, :, None] * direction[:, None, :]
@@ -123,7 +127,7 @@ def triangulate(
         normal += across
         right += np.einsum("nij,nj->ni", across, origin)
     points = np.full((seen.shape[1], 3), np.nan)
-    known = np.count_nonzero(weight > 0, axis=0) >= 2
+    known = (np.count_nonzero(weight > 0, axis=0) >= 2) | (hold > 0)
     if known.any():
         points[known] = np.linalg.solve(normal[known], right[known][..., None])[..., 0]
     return points

@@ -116,6 +116,23 @@ def test_triangulation_undoes_projection(perspective: float, rng: np.random.Gene
     assert np.allclose(found[known], points[known], atol=1e-9)
 
 
+def test_a_point_moves_from_its_start_onto_the_only_ray_that_knows_it(
+    rng: np.random.Generator,
+) -> None:
+    """It comes near to the ray without moving along it, two rays bring it near to where they meet,
+    and one that no view knows stays."""
+    cameras = _turn().nominal(800.0, 1.4)[:2]
+    points = rng.normal(0, 0.08, (3, 3))
+    pixels = np.stack([camera.project(points) for camera in cameras])
+    start = points + rng.normal(0, 0.005, (3, 3))
+    found = triangulate(cameras, pixels, [[1, 1, 0], [0, 1, 0]], start)
+    assert np.linalg.norm(cameras[0].project(found[0]) - pixels[0, 0]) < 0.2
+    ray = cameras[0].view_direction(found[0])
+    assert abs((found[0] - start[0]) @ ray) < 1e-4
+    assert np.linalg.norm(found[1] - points[1]) < 0.05 * np.linalg.norm(start[1] - points[1])
+    assert np.allclose(found[2], start[2])
+
+
 def test_the_nominal_turn_is_the_camera_of_the_conventions() -> None:
     """A vector of zeros gives `Camera.on_turn` at every azimuth."""
     for index, camera in enumerate(_turn().nominal(800.0, 1 / 0.7)):

@@ -44,6 +44,27 @@ def test_a_face_is_pulled_to_its_landmarks(bust: Turntable) -> None:
     assert _error(fitted, bust)[marks].mean() < 0.5 * _error(wrong, bust)[marks].mean()
 
 
+def test_one_photo_bends_the_face_across_its_rays(bust: Turntable) -> None:
+    """The face comes to the landmarks of the only photo there; depths, and the back, stay."""
+    wrong = _stretched(bust.head, (0.94, 0.96, 1.0))
+    one = replace(bust.capture, views=bust.capture.views[:1])
+    scene = Scene(NAMES[:1], bust.cameras[:1], wrong)
+    fitted = fit_head(one, bust.masks[:1], scene, Options(rounds=0)).head
+    marks, camera = bust.head.landmark_vertices, bust.cameras[0]
+    seen = camera.project(bust.head.vertices[marks])
+    before, after = (
+        np.linalg.norm(camera.project(h.vertices[marks]) - seen, axis=1).mean()
+        for h in (wrong, fitted)
+    )
+    assert after < 0.3 * before
+    assert (
+        np.abs(camera.depth(fitted.vertices[marks]) - camera.depth(wrong.vertices[marks])).max()
+        < 0.001
+    )
+    back = np.argmin(wrong.vertices[:, 2])
+    assert np.linalg.norm(fitted.vertices[back] - wrong.vertices[back]) < 0.002
+
+
 def test_a_head_too_big_is_pushed_into_the_silhouettes(bust: Turntable) -> None:
     """A cranium that sticks out of the silhouettes ends up closer to the true one."""
     wrong = _stretched(bust.head, (1.08, 1.08, 1.08))
