@@ -139,12 +139,15 @@ def test_straight_curtains_of_one_photo_have_no_waves() -> None:
 
 
 @pytest.mark.parametrize("blur", [0.0, 1.5])
-def test_noise_in_the_curtains_of_one_photo_is_no_wave(blur: float) -> None:
-    """It runs in all directions alike, fine or coarse; too little hair shows to call it coils."""
+def test_texture_of_one_photo_is_that_of_coils_unless_it_is_short(blur: float) -> None:
+    """What runs in all directions alike, fine or coarse, is noise in hair of 4 cm."""
     view = drawing(0.0, 0.05)
     noise = np.random.default_rng(0).integers(0, 255, view.image.shape, np.uint8)
     image = cv2.GaussianBlur(noise, (0, 0), blur) if blur else noise
-    assert measure_waves(*curtains(replace(view, image=np.asarray(image, np.uint8)))) == Waves()
+    views = curtains(replace(view, image=np.asarray(image, np.uint8)))
+    least = np.zeros((1, 1, 1), np.float32)
+    assert measure_waves(*views, ScalpDistance(least, 0.04)) == Waves()
+    assert measure_waves(*views, ScalpDistance(least, 0.06)) == COILS
 
 
 def test_short_curtains_of_one_photo_have_no_waves() -> None:
@@ -185,11 +188,10 @@ def test_mirrored_and_darkened_photos_show_the_same_curls() -> None:
         assert found.radius == pytest.approx(waves.radius, rel=0.1)
 
 
-def test_straight_hair_and_noise_have_no_waves() -> None:
-    """Lines without coils, noise and a grey picture are straight hair."""
+def test_straight_hair_and_a_grey_picture_have_no_waves() -> None:
+    """Lines without coils, and no lines, are straight hair."""
     straight = drawing(0.0, 0.03)
-    noise = np.random.default_rng(0).integers(0, 255, straight.image.shape, np.uint8)
-    for image in (straight.image, noise, np.full_like(noise, 90)):
+    for image in (straight.image, np.full_like(straight.image, 90)):
         assert measure_waves(*views_of(replace(straight, image=image))) == Waves()
 
 
