@@ -122,7 +122,7 @@ def track(
 ) -> Strands:
     """Grow one strand from every root."""
     longest = scalp_distance.hair_length
-    ways = hair_ways(hull, field.growth, roots, longest, scene.one_sided)
+    ways = hair_ways(hull, field.growth, roots, longest)
     memory = options.wave_share * waves.pitch
     if memory > options.step:
         inertia = max(options.inertia, 1 - options.step / memory)

@@ -238,15 +238,13 @@ def long_share(length: float) -> float:
     return float(np.clip((length - SHORT_HAIR) / (LONG_HAIR - SHORT_HAIR), 0.0, 1.0))
 
 
-def hair_ways(
-    hull: Hull, growth: Float32Array, roots: Roots, longest: float, guessed: bool = False
-) -> Float64Array:
+def hair_ways(hull: Hull, growth: Float32Array, roots: Roots, longest: float) -> Float64Array:
     """Return the ways through the hair (N,) that strands may need, from its longest way, metres.
 
     In long hair that is the longest, or the root's own by the growth potential (X, Y, Z). Short
     hair ends everywhere, and its longest way is that of the tuft that stands off most, or where the
     outlines fit worst. There it is `WAY_OF_HEIGHT` of the lower quartile of the hull's height over
-    the roots, since hulls are too thick, never too thin; over the nearest where it is `guessed`.
+    the nearest roots, since hulls are too thick, never too thin; sides may be shorter than the top.
     """
     share = long_share(longest)
     heights = np.arange(0, LONG_HAIR, hull.grid.spacing / 2)
@@ -259,11 +257,9 @@ def hair_ways(
     left = np.maximum(-hull.grid.sample(growth, roots.positions).astype(np.float64), longest)
     if share == 1 or not known.any():
         return left
-    some = height[known][None]
-    if guessed:
-        near = cKDTree(start[known, 0]).query(roots.positions, k=min(AROUND, some.size))[1]
-        some = some[0, near.reshape(len(roots), -1)]
-    low = np.quantile(some, LOWER_QUARTILE, axis=1)
+    around = min(AROUND, np.count_nonzero(known))
+    near = cKDTree(start[known, 0]).query(roots.positions, k=around)[1].reshape(len(roots), -1)
+    low = np.quantile(height[known][near], LOWER_QUARTILE, axis=1)
     return np.asarray(share * left + (1 - share) * WAY_OF_HEIGHT * low)
 
 

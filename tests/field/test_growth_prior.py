@@ -243,10 +243,10 @@ def test_short_hair_has_no_parting() -> None:
     np.testing.assert_array_equal(plain, parted)
 
 
-def way(hull: Hull, longest: float, guessed: bool = False) -> Float64Array:
+def way(hull: Hull, longest: float) -> Float64Array:
     """The ways (N,) of hair on the ball."""
     nothing = np.zeros(hull.grid.shape, np.float32)
-    return hair_ways(hull, nothing, scalp_roots(ball_head()), longest, guessed)
+    return hair_ways(hull, nothing, scalp_roots(ball_head()), longest)
 
 
 def with_tuft(hull: Hull, radius: float) -> Hull:
@@ -258,20 +258,21 @@ def with_tuft(hull: Hull, radius: float) -> Hull:
 
 
 def test_the_way_through_short_hair_is_that_of_most_of_it() -> None:
-    """A tuft that stands off, or an outline that fits badly, makes no other strand longer."""
+    """A tuft that stands off, or an outline that fits badly, makes no hair beside it longer."""
     hull = curtain(0.004, hem=0.0, thickness=0.012)
     plain = way(hull, 0.02)
     assert plain == pytest.approx(WAY_OF_HEIGHT * 0.01, rel=0.2)  # centres of the outermost cells
-    assert way(with_tuft(hull, 0.015), SHORT_HAIR) == pytest.approx(plain, rel=0.05)
+    tufted = way(with_tuft(hull, 0.015), SHORT_HAIR)
+    beside = scalp_roots(ball_head()).positions[:, 1] < 0.09
+    assert tufted[beside] == pytest.approx(plain[beside], rel=0.05)
 
 
-def test_hair_on_top_is_as_long_as_one_photo_shows_it_there() -> None:
-    """Cropped sides do not shorten the top of hair whose height is smooth, a guess."""
+def test_short_hair_is_as_long_as_it_is_thick_there() -> None:
+    """Cropped sides do not shorten the top."""
     hull = with_tuft(curtain(0.004, hem=0.0, thickness=0.008), 0.07)
     at = scalp_roots(ball_head()).positions
-    ways = way(hull, SHORT_HAIR, guessed=True)
+    ways = way(hull, SHORT_HAIR)
     assert ways[at[:, 1] > 0.09].mean() > 2 * ways[at[:, 1] < 0.03].mean()
-    assert np.ptp(way(hull, SHORT_HAIR)) == 0
 
 
 def test_the_way_through_long_hair_is_its_longest() -> None:
