@@ -22,7 +22,7 @@ import cv2
 import numpy as np
 
 from hairkit import Camera, Capture, Head, Mask, Scene, hookimpl
-from hairkit.arrays import BoolArray, Float32Array, Float64Array, UInt8Array
+from hairkit.arrays import BoolArray, Float32Array, UInt8Array
 from hairkit.cameras.depth_raster import depth_behind, head_depth
 from hairkit.head_model.bare_head import mark_bare_head, mark_upper_head
 from hairkit.imaging.alpha_matting import refine_near_hair
@@ -36,7 +36,7 @@ from hairkit.types.mask import HAIR, PERSON, Masks
 _LEAST_HAIR = 5e-4
 """Share of the picture below which there is no hair; such a view keeps its mask."""
 _REACH, _STEP = 0.3, 0.005
-"""Metres before and behind the middle of the head in which an island's hair may lie, and the
+"""Metres before and behind the head in which an island's hair may lie, and the
 distance of the points that are looked up there."""
 _HIDDEN = 0.02
 """Metres behind the head's surface from which a view does not see a point: the head is an average
@@ -49,6 +49,9 @@ _CONFIRMED = 0.2
 """Share of an island's pixels that other views must show as hair: 0 of a beard's and a shirt's on
 photographs of a man, 1 of locks beside the neck on three captures. With 0.1 a spot on his ear
 stays, with 0.4 two specks go."""
+_THICK, _FILLED = 0.03, 0.5
+"""Metres of hair before the head's surface in which others look for that of a hole, and the share
+of its pixels that they must show as hair: it is a highlight then, not a bald spot."""
 
 
 @hookimpl
@@ -70,7 +73,7 @@ def refine_masks(capture: Capture, masks: tuple[Mask, ...], scene: Scene) -> Mas
             zip(free, (_without_islands(each, prior.bare) for each, prior in found), strict=True)
         )
         every = [labels.get(index, mask.labels) for index, mask in enumerate(masks)]
-        confirmed = _without_strangers(every, scene)
+        confirmed = _as_others_see(every, scene)
         mended = pool.map(_mend, [masks[i] for i in free], priors, [confirmed[i] for i in free])
         better = dict(zip(free, mended, strict=True))
     return Masks(tuple(better.get(index, mask) for index, mask in enumerate(masks)))
@@ -101,47 +104,55 @@ def _without_islands(labels: UInt8Array, bare: Float32Array) -> UInt8Array:
     return np.where((labels == HAIR) & ~rooted[part], np.uint8(PERSON), labels).astype(np.uint8)
 
 
-def _without_strangers(labels: list[UInt8Array], scene: Scene) -> list[UInt8Array]:
-    """Return the labels (h, w) of all views without islands of hair that no other view confirms.
+def _as_others_see(labels: list[UInt8Array], scene: Scene) -> list[UInt8Array]:
+    """Return the labels (h, w) of all views without islands of hair that no other view confirms,
+    and with holes in the hair above the brows filled that others call hair.
 
     Hair that covers some of the scalp is no island.
     """
     scalp = scene.head.vertices[scene.head.scalp > 0.5]
-    small = [
-        camera.resized(*view.shape[::-1])
-        for camera, view in zip(scene.cameras, labels, strict=True)
-    ]
+    small = scene.resized([view.shape[::-1] for view in labels]).cameras
     depths = [head_depth(scene.head, camera) for camera in small]
     views = list(zip(small, labels, depths, strict=True))
     kept = []
     for index, (camera, view, depth) in enumerate(views):
         others = views[:index] + views[index + 1 :]
+        skin = np.where(np.isfinite(depth), depth, camera.depth(np.zeros(3)))
         clean = view.copy()
         count, part = cv2.connectedComponents((view == HAIR).astype(np.uint8))
-        column, row = (
-            camera.project(scalp[depth_behind(camera, depth, scalp) < _HIDDEN]).astype(int).T
-        )
+        shown = scalp[depth_behind(camera, depth, scalp) < _HIDDEN]
+        column, row = camera.project(shown).astype(int).T
         covers = np.bincount(part[row, column], minlength=count) > _ROOTED * len(row)
         for island in (i for i in range(1, count) if not covers[i]):
-            row, column = np.nonzero(part == island)
-            pixels = np.stack([column, row], axis=1)[:: -(-len(row) // _LOOKED_UP)]
-            if _confirmed(pixels + np.float64(0.5), camera, others).mean() < _CONFIRMED:
-                clean[row, column] = PERSON
+            at = part == island
+            if _confirmed(at, skin, (-_REACH, _REACH), camera, others) < _CONFIRMED:
+                clean[at] = PERSON
+        upper = mark_upper_head(scene.head, camera) == 1
+        count, part = cv2.connectedComponents((view == PERSON).astype(np.uint8))
+        for hole in np.setdiff1d(part[upper], part[~upper]):
+            at = part == hole
+            if hole and _confirmed(at, skin, (-_THICK, 0), camera, others) > _FILLED:
+                clean[at] = HAIR
         kept.append(clean)
     return kept
 
 
 def _confirmed(
-    pixels: Float64Array, camera: Camera, others: list[tuple[Camera, UInt8Array, Float32Array]]
-) -> BoolArray:
-    """Return (N,) whether a point behind each pixel (N, 2) is hair in most views that see it."""
-    along = camera.depth(np.zeros(3)) + np.arange(-_REACH, _REACH, _STEP)
-    places = np.broadcast_to(pixels[:, None], (len(pixels), len(along), 2))
-    depths = np.broadcast_to(np.maximum(along, _STEP), places.shape[:2])
-    flat = camera.unproject(places, depths).reshape(-1, 3).astype(np.float32)
+    at: BoolArray,
+    surface: Float32Array,
+    reach: tuple[float, float],
+    camera: Camera,
+    others: list[tuple[Camera, UInt8Array, Float32Array]],
+) -> float:
+    """Return of how many pixels (h, w) a point before or behind a surface is hair in most views
+    that see it, as a share."""
+    row, column = (rows[:: -(-len(rows) // _LOOKED_UP)] for rows in np.nonzero(at))
+    depths = np.maximum(surface[row, column, None] + np.arange(*reach, _STEP), _STEP)
+    pixels = np.stack([column, row], axis=1)[:, None] + np.full((depths.shape[1], 2), 0.5)
+    flat = camera.unproject(pixels, depths).reshape(-1, 3).astype(np.float32)
     votes = np.zeros(len(flat))
     for other, labels, depth in others:
         seen = depth_behind(other, depth, flat) < _HIDDEN
         column, row = other.project(flat[seen]).astype(np.int64).T
         votes[seen] += np.where(labels[row, column] == HAIR, 1, -1)
-    return np.asarray((votes.reshape(len(pixels), -1) > 0).any(axis=1))
+    return float((votes.reshape(depths.shape) > 0).any(axis=1).mean())

@@ -102,10 +102,32 @@ def test_hair_that_no_other_view_confirms_is_dropped() -> None:
         spots[view, name] = (slice(v - 4, v + 5), slice(u - 4, u + 5))
         labels[view][v - 7 : v + 8, u - 7 : u + 8] = PERSON
         labels[view][spots[view, name]] = HAIR
-    kept = head_prior._without_strangers(labels, scene)
+    kept = head_prior._as_others_see(labels, scene)
     assert (kept[1][spots[1, "chin"]] == PERSON).all()
     for view in (1, 2, 3):
         assert (kept[view][spots[view, "lock"]] == HAIR).all()
+
+
+def test_a_hole_in_the_hair_is_filled_where_others_see_hair() -> None:
+    """A highlight that one view takes for skin goes, a bald spot that all see stays, and so does
+    what is below the brows."""
+    _, masks, scene = set_up()
+    points = scene.head.vertices
+    whorl = points[np.linalg.norm(points - [0.0, 0.06, -0.09], axis=1).argmin()]
+    for seen_by in ([2], range(4)):
+        labels = [mask.labels.copy() for mask in masks]
+        for view in seen_by:
+            u, v = scene.cameras[view].project(whorl).astype(int)
+            labels[view][v - 3 : v + 4, u - 3 : u + 4] = PERSON
+        u, v = scene.cameras[2].project(whorl).astype(int)
+        kept = head_prior._as_others_see(labels, scene)[2][v - 3 : v + 4, u - 3 : u + 4]
+        assert (kept == (HAIR if seen_by == [2] else PERSON)).all()
+    labels = [mask.labels.copy() for mask in masks]
+    u, v = scene.cameras[1].project(np.array([0.08, -0.06, -0.01])).astype(int)  # an ear
+    labels[1][v - 7 : v + 8, u - 7 : u + 8] = HAIR
+    labels[1][v - 3 : v + 4, u - 3 : u + 4] = PERSON
+    ear = head_prior._as_others_see(labels, scene)[1][v - 3 : v + 4, u - 3 : u + 4]
+    assert (ear == PERSON).all()
 
 
 def test_clothes_larger_than_the_hair_are_no_hair() -> None:
@@ -118,6 +140,6 @@ def test_clothes_larger_than_the_hair_are_no_hair() -> None:
     jacket[below - 6 :] = PERSON
     jacket[below:] = HAIR
     assert (jacket[below:] == HAIR).sum() > (jacket[: below - 6] == HAIR).sum()
-    kept = head_prior._without_strangers(labels, scene)[0]
+    kept = head_prior._as_others_see(labels, scene)[0]
     assert (kept[below:] == PERSON).all()
     assert (kept[: below - 6] == HAIR).sum() > 0.95 * (jacket[: below - 6] == HAIR).sum()
