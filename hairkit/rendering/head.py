@@ -23,7 +23,7 @@ from hairkit.types.strands import Strands
 
 SKIN = (0.42, 0.24, 0.17)
 """Linear RGB of skin."""
-SCALP_TINT = 0.75
+SCALP_TINT = 0.9
 """Weight of the hair colour on the scalp."""
 MAPS = {
     "albedo": (6, "u_albedo", "u_textured"),
