@@ -45,6 +45,9 @@ mouth: means of 13 captures."""
 CHIN_DEPTH = 1.5
 """A face whose eyes lie farther than this below the crown of the silhouette, head widths, or
 above it, is another person's."""
+SHOULDERS = 1.8
+"""Times the median head's width from which it is no head: a person from behind may be found without
+one."""
 ASIDE, OVER = 1.4, 0.3
 """Head widths from the middle of the head to the sides of the frame, and from the crown to its
 upper edge."""
@@ -218,12 +221,22 @@ def _find_head(view: View) -> Head | None:
 
 
 def _of_one_size(heads: list[Head | None], views: Sequence[View]) -> list[Head | None]:
-    """Return the heads, each as wide as the median one in a photo of its size."""
-    edges = [max(view.photo_size) / view.scale for view in views]
-    shares = [head.width / edge for head, edge in zip(heads, edges, strict=True) if head]
-    usual = float(np.median(shares)) if shares else 0.0
-    each = zip(heads, edges, strict=True)
-    return [head and head._replace(width=usual * edge) for head, edge in each]
+    """Return heads as wide as the median one in a photo of its size; shoulders have its place."""
+    edges = [float(max(view.photo_size)) for view in views]
+    shares = [
+        np.append(view.to_photo(np.array(head[:2])), view.scale * head.width) / edge
+        for head, view, edge in zip(heads, views, edges, strict=True)
+        if head
+    ]
+    *place, usual = np.median(shares, axis=0) if shares else np.zeros(3)
+    alike = []
+    for head, view, edge in zip(heads, views, edges, strict=True):
+        width = float(usual * edge / view.scale)
+        if head and head.width > SHOULDERS * width:
+            middle, crown = view.from_photo(edge * np.array(place)).tolist()
+            head = Head(middle, crown, width)
+        alike.append(head and head._replace(width=width))
+    return alike
 
 
 def _parts(views: Sequence[View], heads: Sequence[Head | None]) -> list[Float64Array]:

@@ -88,6 +88,16 @@ def test_small_heads_are_framed_alike() -> None:
         assert right - left < 8 * RADIUS
 
 
+def test_shoulders_without_their_head_are_no_head() -> None:
+    """A silhouette that begins at the collar has its head where the other photos have theirs."""
+    view, face, person = shoot(300, 200)
+    alpha = person.alpha.copy()
+    alpha[:260] = 0
+    found = find(shoot(300, 200), shoot(310, 204), (view, face, Person(alpha)), shoot(290, 196))
+    assert found.heads[2] == pytest.approx(found.heads[0], abs=12)
+    assert np.abs(found.frames[2] - found.frames[0]).max() < 12
+
+
 def test_a_head_that_fills_the_photo_is_left_alone() -> None:
     """Portraits, and photos in which nobody is found, stay whole."""
     nobody = (View("x", 0.0, np.zeros((60, 80, 3), np.uint8)), Face.absent(), Person.absent())
