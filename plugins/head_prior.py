@@ -49,9 +49,9 @@ _CONFIRMED = 0.2
 """Share of an island's pixels that other views must show as hair: 0 of a beard's and a shirt's on
 photographs of a man, 1 of locks beside the neck on three captures. With 0.1 a spot on his ear
 stays, with 0.4 two specks go."""
-_THICK, _FILLED = 0.03, 0.5
-"""Metres of hair before the head's surface in which others look for that of a hole, and the share
-of its pixels that they must show as hair: it is a highlight then, not a bald spot."""
+_THICK, _FILLED = 0.01, 0.9
+"""Metres before the head's surface in which others look for the hair of a hole, and the share of
+its pixels that they must show as hair: 1 of a man's highlights, 0.7 of another's bald crown."""
 
 
 @hookimpl
@@ -144,8 +144,7 @@ def _confirmed(
     camera: Camera,
     others: list[tuple[Camera, UInt8Array, Float32Array]],
 ) -> float:
-    """Return of how many pixels (h, w) a point before or behind a surface is hair in most views
-    that see it, as a share."""
+    """Return the share of pixels (h, w) near whose surface most views of a point show hair."""
     row, column = (rows[:: -(-len(rows) // _LOOKED_UP)] for rows in np.nonzero(at))
     depths = np.maximum(surface[row, column, None] + np.arange(*reach, _STEP), _STEP)
     pixels = np.stack([column, row], axis=1)[:, None] + np.full((depths.shape[1], 2), 0.5)

@@ -50,8 +50,7 @@ def estimate_scene(
     cameras = nominal_cameras(capture, options)
     weights = np.where(np.arange(LANDMARKS) < JAW_LANDMARKS, options.jaw_weight, 1.0)
     points = triangulate([cameras[i] for i in seen], pixels)
-    scene_from_head = fit_similarity(head.vertices[head.landmark_vertices], points, weights)
-    to_head = scene_from_head.inverse()
+    to_head = fit_similarity(head.vertices[head.landmark_vertices], points, weights).inverse()
     fitted = tuple(to_head.moved_camera(camera) for camera in cameras)
     gap = np.stack([fitted[i].project(to_head.apply(points)) for i in seen]) - pixels
     residual = float(np.sqrt(np.mean(np.sum(gap**2, axis=-1))))

@@ -48,6 +48,8 @@ WAY_OF_HEIGHT = 1.3
 true one with photos alone. Hair that stands needs 0.9 to 1, hair that lies flat 1.3 to 1.6."""
 LOWER_QUARTILE = 0.25
 """Of the heights: the median would be 1.3 to 2 of it, most where outlines fit badly."""
+UNEVEN = 0.004
+"""Metres by which heights differ where outlines fit badly: 0.003 to 0.008 are alike in F."""
 PROBES, AROUND = 2000, 60
 """Roots over which the height is measured; those within about 2 cm of one."""
 FLOW_SMOOTHING = 2.0
@@ -244,7 +246,7 @@ def hair_ways(hull: Hull, growth: Float32Array, roots: Roots, longest: float) ->
     In long hair that is the longest, or the root's own by the growth potential (X, Y, Z). Short
     hair ends everywhere, and its longest way is that of the tuft that stands off most, or where the
     outlines fit worst. There it is `WAY_OF_HEIGHT` of the lower quartile of the hull's height over
-    the nearest roots, since hulls are too thick, never too thin; sides may be shorter than the top.
+    the roots, since hulls are too thick, never too thin; but for `UNEVEN`, of those nearby.
     """
     share = long_share(longest)
     heights = np.arange(0, LONG_HAIR, hull.grid.spacing / 2)
@@ -260,6 +262,7 @@ def hair_ways(hull: Hull, growth: Float32Array, roots: Roots, longest: float) ->
     around = min(AROUND, np.count_nonzero(known))
     near = cKDTree(start[known, 0]).query(roots.positions, k=around)[1].reshape(len(roots), -1)
     low = np.quantile(height[known][near], LOWER_QUARTILE, axis=1)
+    low -= np.clip(low - np.quantile(height[known], LOWER_QUARTILE), -UNEVEN, UNEVEN)
     return np.asarray(share * left + (1 - share) * WAY_OF_HEIGHT * low)
 
 

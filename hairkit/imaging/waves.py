@@ -86,9 +86,8 @@ SURE_PROMINENCE, WIDEST_CURL = 0.14, 0.045
 """Of the pitch of such hair: its least prominence, and its longest, metres, where it is curls; less
 than that, or longer, is chance."""
 COILS, SHORTEST_COILS = Waves(0.004, 0.011), 0.05
-"""Of tight coils, metres: their scale is below what photos of a head resolve (type 4 hair has radii
-of 2 to 5 mm); and how long such hair is: 24 of 25 portraits of it 5.6 cm and more, two
-noisy ones of men's straight cuts 2.7 and 3.8."""
+"""Of tight coils, metres: no photo of a head resolves them (type 4 hair has radii of 2 to 5 mm);
+and their least length: 24 of 25 portraits have 0.056 and more, noisy ones of short cuts less."""
 AXIS_SCATTER = 0.18
 """Radians by which axes scatter about the vertical; as much again for each unit of slope."""
 LINE_SHARE, LINE_SPREAD = 0.45, 0.5
