@@ -24,7 +24,7 @@ from hairkit.head_model.cranium import LEAST_SHARE, RIM, Cranium
 from hairkit.head_model.spread_vertices import spread_vertices
 from hairkit.head_model.thin_plate_spline import ThinPlateSpline
 from hairkit.options import option
-from hairkit.types.head import JAW_LANDMARKS, LANDMARKS
+from hairkit.types.head import BROWS, JAW_LANDMARKS, LANDMARKS
 
 SMOOTHING, ANCHOR_SMOOTHING = 0.02, 1.0
 """Metres: how far landmarks may be missed for a smoother bend, and the cranium's points, which hold
@@ -46,8 +46,6 @@ SKULL = 0.09
 """Radius of the cranium, metres: its rim stands out farther than points near the rim."""
 FAR = 100.0
 """Metres: from there views are orthographic."""
-BROWS = slice(17, 27)
-"""Landmarks of the brows."""
 LARGEST_PULL, ON_OUTLINE = 0.03, 0.002
 """Metres: a bare outline farther off is not that of the cranium; and how near to it counts as on
 it."""
@@ -71,7 +69,8 @@ def fit_head(capture: Capture, masks: tuple[Mask, ...], scene: Scene, options: O
     head = _bend_to_landmarks(capture, scene, options)
     if options.rounds and all(mask.person_known for mask in masks):
         outlines = Outlines.of(masks, count=OUTLINE_POINTS)
-        controls = _spread(head, CONTROLS)
+        above = head.vertices[:, 1] > head.joints[1, 1]  # the neck
+        controls = spread_vertices(head, np.flatnonzero(above), CONTROLS)
         cranium = Cranium.of(head, masks, outlines.scale)
         for _ in range(options.rounds):
             head = _bend_to_outlines(head, scene.cameras, outlines, controls, cranium, options)
@@ -97,12 +96,6 @@ def _bend_to_landmarks(capture: Capture, scene: Scene, options: Options) -> Head
     places = np.concatenate([source, anchors])
     moves = np.concatenate([points - source, np.zeros_like(anchors)])
     return _warp(head, places, moves, smoothing)
-
-
-def _spread(head: Head, count: int) -> Int64Array:
-    """Return `count` vertices spread evenly over the head above the neck."""
-    low = head.joints[1, 1]
-    return spread_vertices(head, np.nonzero(head.vertices[:, 1] > low)[0], count)
 
 
 def _bend_to_outlines(

@@ -17,12 +17,10 @@ from hairkit.arrays import BoolArray, Float32Array, Float64Array, UInt8Array
 from hairkit.head_model.eyes import IRIS, IRIS_RADIUS, LOWER_LID, SCLERA
 from hairkit.types.camera import Camera
 from hairkit.types.capture import View
-from hairkit.types.head import Head
+from hairkit.types.head import EYES, Head
 
-EYES = (slice(36, 42), slice(42, 48))
-"""iBUG points of the right and the left eye."""
 CORNERS = 0, 3
-"""Of its points, those at its corners."""
+"""Of an eye's points, those at its corners."""
 LEAST_WIDTH = 12.0
 """Pixels between the corners of an eye whose colour is measured."""
 LEAST_OPEN = 0.15

@@ -46,8 +46,7 @@ CHIN_DEPTH = 1.5
 """A face whose eyes lie farther than this below the crown of the silhouette, head widths, or
 above it, is another person's."""
 SHOULDERS = 1.8
-"""Times the median head's width from which it is no head: a person from behind may be found without
-one."""
+"""Times the median head's width from which only shoulders were found, as from behind."""
 ASIDE, OVER = 1.4, 0.3
 """Head widths from the middle of the head to the sides of the frame, and from the crown to its
 upper edge."""

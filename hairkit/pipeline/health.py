@@ -30,7 +30,7 @@ from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture, View
 from hairkit.types.evidence import Evidence
 from hairkit.types.groom import Groom
-from hairkit.types.head import JAW_LANDMARKS, Head
+from hairkit.types.head import EYES, JAW_LANDMARKS, Head
 from hairkit.types.mask import HAIR, PERSON, Mask
 from hairkit.types.parting import Parting
 from hairkit.types.scene import Scene
@@ -41,8 +41,6 @@ from hairkit.types.volume import Hull
 
 RASTER_HEIGHT = 240
 """Height in pixels at which hull and masks are compared; a cell of the hull is a pixel or more."""
-EYES = (slice(36, 42), slice(42, 48))
-"""The iBUG points of either eye; their mean stands for the pupil."""
 FACE = [*range(2, 15), *range(28, 68)]
 """The iBUG points of cheeks, jaw, nose, eyes and mouth; their convex hull bears no hair of the
 head. Brows and temples lie under fringes."""

@@ -19,6 +19,8 @@ LANDMARKS = 68
 """Landmarks of a face, in the order of iBUG (Sagonas et al. 2013)."""
 JAW_LANDMARKS = 17
 """The first landmarks trace the jaw; detectors place them less surely."""
+BROWS, EYES = slice(17, 27), (slice(36, 42), slice(42, 48))
+"""Landmarks of the brows, and of the right and the left eye; their mean stands for the pupil."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,6 +20,7 @@ from hairkit import Camera, Mask, OrientationMap, Scene, VoxelGrid
 from hairkit.arrays import BoolArray, Float64Array
 from hairkit.field.hair_depth import HairDepth, guess_hair_depth, head_middle
 from hairkit.head_model.torso import Torso
+from hairkit.types.head import BROWS
 
 CAP = 0.1
 """Radius of the arcs that measure height above the head's middle, metres."""
@@ -47,6 +48,9 @@ down it spreads over the shoulders."""
 CUT_OFF = 0.1
 """How far hair goes on that the picture's lower edge cuts off, metres. F at 4 mm/40 of eight fronts
 cut off below the chin (length): 55.9 (0.55) without, 60.6 (0.75) here, 58.1 (0.85) with 0.15."""
+CHIN_POINT, EYE_CORNERS, BEHIND_EYES = 8, [36, 45], 0.02
+"""Landmarks, and metres behind these outer corners from which on hair beside the face lies on it:
+with eight photos up to 0.6 % of a head's hair stands before, with one it was up to 17 %."""
 FACE = 0.4
 """Cosine of the bearing up to which an outline is that of the face."""
 
@@ -63,6 +67,10 @@ class Shell:
     """Bearing (radians) of each outline, and its radius (rows,)."""
     depths: tuple[HairDepth, ...]
     """How far away the hair is that each view sees."""
+    head: Float64Array
+    """(BEARINGS, rows) radius of the head, metres."""
+    face: tuple[float, float, float]
+    """Heights of chin and brows; how far before the middle hair between them stands off, metres."""
 
     @classmethod
     def of(
@@ -89,16 +97,18 @@ class Shell:
             guess_hair_depth(scene.head, *view)
             for view in zip(scene.cameras, masks, orientations, strict=True)
         )
-        return cls(middle, np.where(there, limit, -1.0), sides, depths)
+        face = (np.inf, -np.inf, np.inf)
+        if scene.head.landmark_vertices is not None:
+            places = scene.head.vertices[scene.head.landmark_vertices] - middle
+            before = places[EYE_CORNERS, 2].mean() - BEHIND_EYES
+            face = (places[CHIN_POINT, 1], places[BROWS, 1].mean(), before)
+        return cls(middle, np.where(there, limit, -1.0), sides, depths, head, face)
 
     def inside(self, grid: VoxelGrid) -> BoolArray:
         """Return the cells (X, Y, Z) in which there may be hair."""
         points = grid.centres_of(np.ones(grid.shape, bool)) - self.middle
         bearing, row, radius = _place(points)
-        limit = ndimage.map_coordinates(
-            np.pad(self.limit, ((0, 1), (0, 0)), "wrap"), [bearing, row], order=1, mode="nearest"
-        )
-        found = radius <= limit
+        found = radius <= _look_up(self.limit, bearing, row)
         for side, outline in self.sides:
             across = points @ np.array([np.sin(side), 0.0, np.cos(side)])
             width = np.interp(row, np.arange(len(outline)), outline)
@@ -108,7 +118,10 @@ class Shell:
             seen, inwards = depth.within(points + self.middle)
             views += seen
             deep += np.where(seen, inwards, 0)
-        return np.asarray(np.where(views, deep >= 0, found).reshape(grid.shape))
+        chin, brows, before = self.face
+        beside = (points[:, 1] > chin) & (points[:, 1] < brows) & (points[:, 2] > before)
+        beside &= radius > _look_up(self.head, bearing, row) + LYING
+        return np.asarray((np.where(views, deep >= 0, found) & ~beside).reshape(grid.shape))
 
 
 def _heights() -> Float64Array:
@@ -124,6 +137,12 @@ def _place(points: Float64Array) -> tuple[Float64Array, Float64Array, Float64Arr
     height = np.where(above, CAP * np.arctan2(np.maximum(y, 0), level), y)
     bearing = (np.arctan2(x, z) / (2 * np.pi) + 0.5) * BEARINGS
     return bearing, (height + REACH) / STEP, np.where(above, np.hypot(level, y), level)
+
+
+def _look_up(radii: Float64Array, bearing: Float64Array, row: Float64Array) -> Float64Array:
+    """Return radii (N,) of a table (BEARINGS, rows) at columns and rows (N,)."""
+    around = np.pad(radii, ((0, 1), (0, 0)), "wrap")
+    return np.asarray(ndimage.map_coordinates(around, [bearing, row], order=1, mode="nearest"))
 
 
 def _radii(points: Float64Array) -> Float64Array:
@@ -145,11 +164,6 @@ def _hang(head: Float64Array) -> Float64Array:
     return radii
 
 
-def _bearings() -> Float64Array:
-    """Return the columns' bearings, radians."""
-    return (np.arange(BEARINGS) / BEARINGS - 0.5) * 2 * np.pi
-
-
 def _column(bearing: float) -> int:
     """Return the column of a bearing in radians."""
     return round((bearing / (2 * np.pi) + 0.5) * BEARINGS) % BEARINGS
@@ -169,11 +183,6 @@ def _outwards(bearing: float) -> Float64Array:
     return np.stack([np.sin(bearing) * level, np.sin(rise), np.cos(bearing) * level], axis=1)
 
 
-def _feet() -> Float64Array:
-    """Return where (rows, 3) the rows' radii begin, off the head's middle, metres."""
-    return np.stack([[0.0, min(height, 0.0), 0.0] for height in _heights()])
-
-
 def _outline(
     camera: Camera, mask: Mask, middle: Float64Array, side: float, support: Float64Array
 ) -> Float64Array:
@@ -183,7 +192,8 @@ def _outline(
     nearest row that shows its end. Cut off below it goes on as wide as there, down to `CUT_OFF`.
     """
     radii, rows = np.arange(0.0, FARTHEST, PROBE), np.arange(len(support))
-    points = middle + _feet()[:, None] + radii[:, None] * _outwards(side)[:, None]
+    feet = middle + np.outer(np.minimum(_heights(), 0.0), [0.0, 1.0, 0.0])
+    points = feet[:, None] + radii[:, None] * _outwards(side)[:, None]
     found = np.where(_hair_at(camera, mask, points), radii, 0.0).max(axis=1)
     last = np.rint(found / PROBE).astype(int)
     beyond = camera.project(points[rows, np.minimum(last + 1, len(radii) - 1)])
@@ -207,7 +217,7 @@ def _between(
     sides: Sequence[tuple[float, Float64Array]], support: Float64Array
 ) -> tuple[Float64Array, BoolArray]:
     """Return how far hair reaches beyond the support (BEARINGS, rows), and whether any hangs."""
-    bearings = _bearings()
+    bearings = (np.arange(BEARINGS) / BEARINGS - 0.5) * 2 * np.pi
     thick, shown, total, nearest = np.zeros((4, *support.shape))
     for mirror, weight in ((1, 1.0), (-1, MIRRORED)):
         for side, outline in sides:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from hairkit.head_model.eye_colours import EYES, find_eye_colours
+from hairkit.head_model.eye_colours import find_eye_colours
 from hairkit.head_model.eyes import (
     CENTRE,
     IRIS,
@@ -20,7 +20,7 @@ from hairkit.head_model.eyes import (
 from hairkit.head_model.identity import blend_head
 from hairkit.head_model.template import default_head
 from hairkit.types.capture import View
-from hairkit.types.head import Head
+from hairkit.types.head import EYES, Head
 
 HEADS = {
     "average": {},

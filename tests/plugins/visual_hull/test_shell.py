@@ -98,6 +98,30 @@ def test_hair_that_is_seen_lies_between_the_depths_that_are_told(
     assert seen[:, 2].min() == pytest.approx(-0.05, abs=2 * OPTIONS.voxel_size)
 
 
+def test_hair_beside_the_face_does_not_hide_it_from_the_side(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """However near the network takes hair to be, it stays behind the eyes, if a face says where
+    these are."""
+    scene, masks = photo()
+
+    def guess(head: Head, camera: Camera, mask: Mask, known: OrientationMap) -> HairDepth:
+        at = float(camera.depth([0.0, 0.0, 0.0]))
+        near, far = (np.full(mask.labels.shape, at + d, np.float32) for d in (-0.14, 0.05))
+        return HairDepth(camera, mask.hair, near, far)
+
+    monkeypatch.setattr(shell, "guess_hair_depth", guess)
+    places = scene.head.vertices[scene.head.landmark_vertices]
+    corner = places[shell.EYE_CORNERS, 2].mean()
+    nearest = []
+    for head in (scene.head, replace(scene.head, landmark_vertices=None)):
+        found = cells(replace(scene, head=head), masks)
+        level = (found[:, 1] > places[8, 1]) & (found[:, 1] < places[shell.BROWS, 1].mean())
+        nearest.append(found[level & (np.abs(found[:, 0]) > 0.09), 2].max())
+    assert nearest[0] < corner - shell.BEHIND_EYES + OPTIONS.voxel_size
+    assert nearest[1] > corner + 0.02
+
+
 @pytest.mark.parametrize("height", [-0.08, -0.1])
 def test_hair_that_the_lower_edge_cuts_off_goes_on(height: float) -> None:
     """It ends `CUT_OFF` below the edge of a photo that is cropped above the hair's ends."""
