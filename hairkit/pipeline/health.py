@@ -186,7 +186,7 @@ def assess_landmarks(capture: Capture, scene: Scene) -> tuple[Figure, ...]:
     steep = steepness([view for view, _ in known])
     known = [each for each, far in zip(known, steep, strict=True) if far == 0]
     gaps = [_misfit_mm(camera, points, view.landmarks) for view, camera in known]
-    if gaps:
+    if gaps and count > 1:  # to those of one view the head is bent
         worst = known[int(np.argmax(gaps))][0]
         figures.append(LANDMARK_MM.figure(max(gaps), f"look at {_label(worst)}"))
     pupils = 1000 * float(np.linalg.norm(np.subtract(*(points[e].mean(axis=0) for e in EYES))))

@@ -290,6 +290,15 @@ def test_curls_that_turn_one_way_are_judged_by_their_directions(run: Run) -> Non
     assert "strands: directions as photographed" in names
 
 
+def test_landmarks_of_one_view_are_not_judged(run: Run) -> None:
+    """The head is bent to them, wherever they are."""
+    first, *others = run.capture.views
+    apart = replace(first, landmarks=np.full((68, 2), 5.0))
+    alone = (replace(view, landmarks=None) for view in others)
+    run.capture = Capture((apart, *alone))
+    assert "cameras: landmarks off by" not in run.figures()
+
+
 def test_landmarks_of_a_steep_face_are_not_judged(run: Run) -> None:
     """They are off where the cameras are right."""
     steep = Face(1.0, np.full((68, 2), 5.0), np.ones(68), 52.0, 0.0, 0.0)
