@@ -123,8 +123,9 @@ def test_a_hole_in_the_hair_is_filled_where_others_see_hair() -> None:
         kept = head_prior._as_others_see(labels, scene)[2][v - 3 : v + 4, u - 3 : u + 4]
         assert (kept == (HAIR if seen_by == [2] else PERSON)).all()
     labels = [mask.labels.copy() for mask in masks]
-    u, v = scene.cameras[1].project(np.array([0.08, -0.06, -0.01])).astype(int)  # an ear
-    labels[1][v - 7 : v + 8, u - 7 : u + 8] = HAIR
+    for view in (2, 0, 1):  # an ear, the last one seen
+        u, v = scene.cameras[view].project(np.array([0.08, -0.06, -0.01])).astype(int)
+        labels[view][v - 7 : v + 8, u - 7 : u + 8] = HAIR
     labels[1][v - 3 : v + 4, u - 3 : u + 4] = PERSON
     ear = head_prior._as_others_see(labels, scene)[1][v - 3 : v + 4, u - 3 : u + 4]
     assert (ear == PERSON).all()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -54,6 +55,17 @@ def cells(scene: Scene, masks: tuple[Mask, ...]) -> np.ndarray:
     return hull.grid.centres_of(hull.dense).astype(np.float64)
 
 
+def tell(first: float, last: float) -> Callable[..., HairDepth]:
+    """A network that tells the same depths everywhere, metres behind the head's origin."""
+
+    def guess(head: Head, camera: Camera, mask: Mask, known: OrientationMap) -> HairDepth:
+        at = float(camera.depth([0.0, 0.0, 0.0]))
+        near, far = (np.full(mask.labels.shape, at + d, np.float32) for d in (first, last))
+        return HairDepth(camera, mask.hair, near, far)
+
+    return guess
+
+
 def test_hair_behind_is_as_thick_as_beside() -> None:
     """What the photo does not show stands off the head as far as its outline, and is as long."""
     found = cells(*photo())
@@ -84,13 +96,7 @@ def test_hair_that_is_seen_lies_between_the_depths_that_are_told(
 ) -> None:
     """Cells behind the photo's hair follow the network, and not the outline's thickness."""
     scene, masks = photo()
-
-    def guess(head: Head, camera: Camera, mask: Mask, known: OrientationMap) -> HairDepth:
-        at = float(camera.depth([0.0, 0.0, 0.0]))
-        near, far = (np.full(mask.labels.shape, at + d, np.float32) for d in (-0.03, 0.05))
-        return HairDepth(camera, mask.hair, near, far)
-
-    monkeypatch.setattr(shell, "guess_hair_depth", guess)
+    monkeypatch.setattr(shell, "guess_hair_depth", tell(-0.03, 0.05))
     found = cells(scene, masks)
     x, y = np.floor(scene.cameras[0].project(found)).astype(int).T
     seen = found[masks[0].hair[y, x]]
@@ -104,13 +110,7 @@ def test_hair_beside_the_face_does_not_hide_it_from_the_side(
     """However near the network takes hair to be, it stays behind the eyes, if a face says where
     these are."""
     scene, masks = photo()
-
-    def guess(head: Head, camera: Camera, mask: Mask, known: OrientationMap) -> HairDepth:
-        at = float(camera.depth([0.0, 0.0, 0.0]))
-        near, far = (np.full(mask.labels.shape, at + d, np.float32) for d in (-0.14, 0.05))
-        return HairDepth(camera, mask.hair, near, far)
-
-    monkeypatch.setattr(shell, "guess_hair_depth", guess)
+    monkeypatch.setattr(shell, "guess_hair_depth", tell(-0.14, 0.05))
     places = scene.head.vertices[scene.head.landmark_vertices]
     corner = places[shell.EYE_CORNERS, 2].mean()
     nearest = []
