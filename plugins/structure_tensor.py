@@ -84,7 +84,7 @@ class Options:
         2.0, low=1.0, high=32.0, doc="Narrowest window, from which noise is measured.", unit="px"
     )
     noise_gain: float = option(
-        2.0,
+        4.0,
         low=0.0,
         high=100.0,
         doc="Detail is kept where its power exceeds this multiple of the noise.",

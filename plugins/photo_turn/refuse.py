@@ -37,6 +37,8 @@ CLOTHES_APART, CLOTHES_RATIO, CLOTHES_NOISE = 0.2, 4.5, 0.03
 """Two groups of photos show two people if their clothes differ by the first in log chromaticity,
 and by the second times the spread within the groups plus the third. The ratio is 0.4 to 2.1 in nine
 turns, and 5.9 to 19 in 36 mixtures of two people in unlike clothes."""
+CLOTHES_PALER = 0.5
+"""Clothes are as pale as this share of their colour where light shines on them."""
 FEWEST_OF_ONE = 2
 """A group has at least so many photos: one alone may be badly lit."""
 
@@ -69,7 +71,9 @@ def check_one_person(views: Sequence[View], clothes: Float64Array) -> None:
     for cut in range(FEWEST_OF_ONE, len(known) - FEWEST_OF_ONE + 1):
         groups = along[:cut], along[cut:]
         middles = np.array([colours[group].mean(axis=0) for group in groups])
-        apart = float(np.linalg.norm(middles[1] - middles[0]))
+        pale, full = sorted(middles, key=lambda colour: float(np.linalg.norm(colour)))
+        share = np.clip(pale @ full / max(full @ full, 1e-9), CLOTHES_PALER, 1.0)
+        apart = float(np.linalg.norm(pale - share * full))
         squares = [((colours[g] - m) ** 2).sum() for g, m in zip(groups, middles, strict=True)]
         within = float(np.sqrt(sum(squares) / len(known)))
         if apart > max(CLOTHES_APART, CLOTHES_RATIO * (within + CLOTHES_NOISE)):

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from hairkit_plugins.photo_turn import IN_ORDER, appearance, refuse
 from hairkit_plugins.photo_turn.arrangement import Evidence, Placed, wrap
-from hairkit_plugins.photo_turn.refuse import check_turn
+from hairkit_plugins.photo_turn.refuse import check_one_person, check_turn
 from hairkit_plugins.photo_turn.search import UNEVEN_DEG, Search
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
@@ -356,6 +356,15 @@ def test_what_is_no_turn_is_refused(reason: str) -> None:
         find(REFUSED[reason]())
     assert "IMG_" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("other", "refused"), [((-0.41, 0.58), False), ((0.41, 0.58), True)])
+def test_one_shirt_in_light_and_shadow(other: tuple[float, float], refused: bool) -> None:
+    """The sheen of a blue shirt is paler than its shadow by the window; a red one is another."""
+    views = [shot.view for shot in ring(EIGHT)]
+    clothes = np.array([(-0.32, 0.38)] * 4 + [other] * 4)
+    with pytest.raises(InputError, match="other clothes") if refused else nullcontext():
+        check_one_person(views, clothes)
 
 
 def test_a_face_far_from_its_place_is_refused() -> None:
