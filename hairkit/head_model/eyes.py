@@ -24,6 +24,8 @@ RADIUS = 12.0
 """Of the eyeballs."""
 IRIS_RADIUS, PUPIL_RADIUS = 5.8, 2.0
 """Of the iris and of the pupil."""
+CORNEA = 1.3
+"""By which the middle of the iris stands out of the sphere: from the side, too, it is seen."""
 _Curve = list[tuple[float, float]]
 UPPER_LID: _Curve = [(17.5, -37.6), (20, -34.6), (27, -31), (32, -30.6), (37, -31.5), (43.5, -36)]
 """Edge of the left upper lid, x and y."""
@@ -83,7 +85,8 @@ def eyeballs() -> Eyeballs:
     across = unit[:, :2] / np.maximum(length, 1e-9)[:, None]
     flat = across * np.sin(0.5 * np.arccos(unit[:, 2:].clip(-1, 1)))
     flat[-1] = flat[-2]
-    left, faces = 1e-3 * (CENTRE + RADIUS * unit), _sphere_faces()
+    bulge = CORNEA * np.clip(1 - (RADIUS * length / IRIS_RADIUS) ** 2, 0, 1) * (unit[:, 2] > 0)
+    left, faces = 1e-3 * (CENTRE + (RADIUS + bulge[:, None]) * unit), _sphere_faces()
     disc = np.array([1 - DISC_CENTRE, DISC_CENTRE]) + DISC_RADIUS * flat
     mirror = np.array([-1.0, 1, 1])
     right = np.column_stack([1 - disc[:, 0], disc[:, 1]])

@@ -9,7 +9,9 @@ import trimesh
 from hairkit.head_model.eye_colours import find_eye_colours
 from hairkit.head_model.eyes import (
     CENTRE,
+    CORNEA,
     IRIS,
+    IRIS_RADIUS,
     RADIUS,
     SCLERA,
     between_lids,
@@ -39,14 +41,17 @@ def first_hits(head: Head, starts: np.ndarray) -> np.ndarray:
 
 
 def test_eyeballs_are_closed_spheres() -> None:
-    """Both are closed, wound outwards, have the radius, and are mirror images."""
+    """Both are closed, wound outwards, have the radius but at the cornea, and are mirror images."""
     balls = eyeballs()
     mesh = trimesh.Trimesh(balls.vertices, balls.faces, process=False)
     assert mesh.is_watertight
     assert mesh.is_winding_consistent
     assert mesh.volume == pytest.approx(2 * 4 / 3 * np.pi * (1e-3 * RADIUS) ** 3, rel=0.05)
     left, right = np.split(balls.vertices, 2)
-    np.testing.assert_allclose(np.linalg.norm(1e3 * left - CENTRE, axis=1), RADIUS)
+    away = np.linalg.norm(1e3 * left - CENTRE, axis=1)
+    assert away[0] == away.max() == pytest.approx(RADIUS + CORNEA)
+    iris = np.linalg.norm(1e3 * left[:, :2] - CENTRE[:2], axis=1) < IRIS_RADIUS
+    np.testing.assert_allclose(away[~iris], RADIUS)
     np.testing.assert_allclose(left * [-1, 1, 1], right)
 
 
