@@ -92,6 +92,8 @@ random, below 0.1 where they are wrong. Without confidence 0."""
 DIRECTIONS = Limits(0.7, 0.5, "strands", "directions as photographed")
 """0.88 to 0.97 on six captures of straight hair, photos alone, 0.76 on short hair; at most 0.44
 with strands turned by 45 degrees, 0.32 with curls, 0.23 where coils came out straight."""
+LEAST_JUDGED = 0.1
+"""Share of the visible hair whose direction must be known."""
 COHERENCE = Limits(0.28, 0.34, "strands", "direction of curly hair")
 """Of photos of hair that came out in steep curls: 0.14 on coils, 0.35 to 0.55 on straight hair."""
 ASTRAY = Limits(0.08, 0.15, "strands", "drawn where no photo has hair")
@@ -321,22 +323,26 @@ def assess_drawing(
     """Return how the drawn guides agree with the photos: directions, where hair is, and curls.
 
     Directions of steep curls are not judged, for their coils are not where those of the photos are:
-    but where all turn one way, as a slant says, photos show their axes.
+    but where all turn one way, as a slant says, photos show their axes. Those of hair so short or
+    so small in the photos that hardly any lies away from its edges are not, either.
     """
     names, groom = scene.names, with_pieces(groom)
     views = [compare_drawing(groom, *row) for row in zip(scene.cameras, shown, strict=True)]
     steep = groom.material.curl_radius * 2 * np.pi > groom.material.curl_pitch
+    length, judged = sum(v.shown for v in views), sum(v.judged for v in views)
+    figures = []
     if not steep or slant:
         shares = [share_of(view.right, view.judged) for view in views]
-        share = share_of(sum(v.right for v in views), sum(v.judged for v in views))
+        share = share_of(sum(v.right for v in views), judged)
         note = f"the hair lies otherwise than in the photos, most of all in {_worst(names, shares)}"
-        figures = [DIRECTIONS.figure(share, note)]
+        if judged > LEAST_JUDGED * length:
+            figures = [DIRECTIONS.figure(share, note)]
     else:
         clear = float(np.mean([view.coherence for view in views]))
         note = "the photos show strands that run side by side; set curl_radius_mm = 0 in [hair]"
         figures = [COHERENCE.figure(clear, note)]
     astray = [view.astray / max(view.shown, 1.0) for view in views]
-    share = sum(v.astray for v in views) / max(sum(v.shown for v in views), 1.0)
+    share = sum(v.astray for v in views) / max(length, 1.0)
     note = f"most of all in {_worst(names, [-each for each in astray])}"
     figures.append(ASTRAY.figure(share, note))
     left = [view.bare / max(view.standing, 1) for view in views]
