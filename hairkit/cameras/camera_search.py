@@ -42,6 +42,10 @@ FARTHER, FARTHER_NOISE, MOST_FARTHER = 1.2, (4.0, 2.0), 6
 most steps one way. A search ends near the distance from which it starts: of 20 turns without EXIF
 the focal length was 0.7 to 1.2 of the true one, and with steps 0.9 to 1.2."""
 
+STRAY = np.radians(20)
+"""Elevation off that of the other views from which one is a stray: a smooth bob from behind has the
+outline of one from above."""
+
 
 @dataclass(frozen=True, eq=False)
 class Fit:
@@ -92,7 +96,19 @@ class Search:
         fit = _best(self.settle(each, COARSE_TO_FINE) for each in starts)
         if any_distance:
             fit = self._from_distances(fit)
-        return self.settle(self._from_uneven_turns(fit, azimuths))
+        return self._without_strays(self.settle(self._from_uneven_turns(fit, azimuths)))
+
+    def _without_strays(self, fit: Fit) -> Fit:
+        """Return the better of this solution and that from strays moved to their azimuth, at
+        the others' elevation and distance."""
+        vector = fit.vector.copy()
+        views = vector[SHARED:].reshape(-1, PER_VIEW)
+        stray = np.abs(views[:, 1] - np.median(views[:, 1])) > STRAY
+        if not stray.any() or stray.all():
+            return fit
+        views[stray] = [0, *np.median(views[~stray, 1:], axis=0)]
+        trial = replace(fit, vector=vector, precision=1.0)
+        return _best([fit, self.settle(trial, (*COARSE_TO_FINE, 1.0, 1.0))])
 
     def _from_distances(self, fit: Fit) -> Fit:
         """Return the best solution from greater distances on, or else from smaller ones."""
