@@ -78,9 +78,6 @@ class Options:
     difference_of_gaussians: bool = option(
         False, doc="First keep only detail, by a difference of Gaussians."
     )
-    interpolate: bool = option(
-        False, doc="Place the angle between the filter directions by a parabola."
-    )
 
 
 @hookimpl
@@ -171,31 +168,17 @@ def _strongest(
         part = slice(start, start + _CHUNK)
         parts = [rows[part] @ factors for rows, (_, factors) in zip(inputs, bases, strict=True)]
         response = np.abs(parts[0]) if len(parts) == 1 else np.hypot(*parts)
-        angles[part], weights[part] = angle_and_confidence(response, options.interpolate)
+        angles[part], weights[part] = angle_and_confidence(response)
     angle, weight = np.zeros((2, *hair.shape), np.float32)
     angle[hair], weight[hair] = angles, weights
     return angle, weight
 
 
-def angle_and_confidence(
-    response: Float32Array, interpolate: bool = False
-) -> tuple[Float32Array, Float32Array]:
-    """Return the strand angle of the largest of the responses F and its confidence.
+def angle_and_confidence(response: Float32Array) -> tuple[Float32Array, Float32Array]:
+    """Return the strand angle (P,) of the largest of the responses F (P, angles), and a confidence.
 
-    The confidence is `w = sum over t of sqrt(d(t, t~) (F(t) - F(t~))^2)`, d the angle on the half
-    circle between t and the strongest direction t~ (Paris et al. 2004).
-
-    Parameters
-    ----------
-    response : (P, angles)
-        F of every pixel, at least 0.
-    interpolate : bool
-        Move the angle to the top of the parabola through t~ and its neighbours.
-
-    Returns
-    -------
-    angle, confidence : (P,) float32
-        Angle in [0, pi); confidence at least 0, in units of `response`.
+    That (P,), in units of F, is `w = sum over t of sqrt(d(t, t~) (F(t) - F(t~))^2)`, d the angle on
+    the half circle between t and the strongest direction t~ (Paris et al. 2004).
     """
     count = response.shape[1]
     steps = np.arange(count)
@@ -204,9 +187,4 @@ def angle_and_confidence(
     rows, best = np.arange(len(response)), response.argmax(axis=1)
     peak = response[rows, best]
     weight = peak * root[0].sum() - np.einsum("pt,pt->p", root[best], response)
-    turn = best.astype(np.float64)
-    if interpolate:
-        before, after = response[rows, best - 1], response[rows, (best + 1) % count]
-        bend = np.maximum(2 * peak - before - after, 1e-12)
-        turn += np.clip(0.5 * (after - before) / bend, -0.5, 0.5)
-    return wrap_angle(turn * np.pi / count + np.pi / 2), np.maximum(weight, 0)
+    return wrap_angle(best * (np.pi / count) + np.pi / 2), np.maximum(weight, 0)

@@ -9,7 +9,7 @@ Photos of hair need four things more:
 
 1. shading, highlights and silhouettes are removed: log luminance, minus its masked mean, over its
    local deviation; pixels of the mask's edge, which mix in the background, are left out;
-2. the finest gradient shows strands best; wider ones may be added for blurred or noisy photos;
+2. the finest gradient shows strands best;
 3. gradients are weighted by their length, not its square, so that outliers count less;
 4. no window suits both straight hair and curls. The mean over the widest window is refined by every
    narrower one where the difference exceeds the noise (the Wiener gain of Lee 1980 on a Laplacian
@@ -69,13 +69,7 @@ class Options:
     """Settings of the structure tensor; lengths are for pictures 1080 pixels high."""
 
     gradient_sigma: float = option(
-        0.7, low=0.3, high=10.0, doc="Gaussian under the finest gradient.", unit="px"
-    )
-    gradient_scales: int = option(
-        1, low=1, high=5, doc="Number of gradients that are added, each twice as wide as the last."
-    )
-    magnitude_power: float = option(
-        1.0, low=0.0, high=2.0, doc="Gradients count by their length to this power; 2 is classic."
+        0.7, low=0.3, high=10.0, doc="Gaussian under the gradient.", unit="px"
     )
     window_sigma: float = option(
         32.0, low=1.0, high=128.0, doc="Widest Gaussian window of the tensor.", unit="px"
@@ -130,21 +124,17 @@ def _tensor(
 ) -> Float32Array:
     """Return (H, W, 4): double-angle vector of the strand, energy, and weight, 0 outside `core`.
 
-    Each scale is divided by its response to white noise, so that all have equal weight.
+    Gradients are divided by their response to white noise.
     """
-    parts = [np.zeros_like(detail) for _ in range(3)]
-    for index in range(options.gradient_scales):
-        sigma = options.gradient_sigma * scale * 2**index
-        gain = math.sqrt(8 * math.pi) * max(sigma, _LEAST_GRADIENT_SIGMA) ** 2 / _SCHARR_GAIN
-        smooth = blur(detail, sigma)
-        along_x = cv2.Scharr(smooth, cv2.CV_32F, 1, 0, scale=gain)
-        along_y = cv2.Scharr(smooth, cv2.CV_32F, 0, 1, scale=gain)
-        square_x, square_y = along_x * along_x, along_y * along_y
-        energy = square_x + square_y
-        weight = core * cv2.pow(energy + _LEAST_ENERGY, options.magnitude_power / 2 - 1)
-        parts[0] += (square_y - square_x) * weight
-        parts[1] -= 2 * along_x * along_y * weight
-        parts[2] += energy * weight
+    sigma = options.gradient_sigma * scale
+    gain = math.sqrt(8 * math.pi) * max(sigma, _LEAST_GRADIENT_SIGMA) ** 2 / _SCHARR_GAIN
+    smooth = blur(detail, sigma)
+    along_x = cv2.Scharr(smooth, cv2.CV_32F, 1, 0, scale=gain)
+    along_y = cv2.Scharr(smooth, cv2.CV_32F, 0, 1, scale=gain)
+    square_x, square_y = along_x * along_x, along_y * along_y
+    energy = square_x + square_y
+    weight = core / cv2.sqrt(energy + _LEAST_ENERGY)
+    parts = (square_y - square_x) * weight, -2 * along_x * along_y * weight, energy * weight
     return np.asarray(cv2.merge([*parts, core]), np.float32)
 
 

@@ -43,8 +43,7 @@ most steps one way. A search ends near the distance from which it starts: of 20 
 the focal length was 0.7 to 1.2 of the true one, and with steps 0.9 to 1.2."""
 
 STRAY = np.radians(20)
-"""Elevation off that of the other views from which one is a stray: a smooth bob from behind has the
-outline of one from above."""
+"""Elevation off the others' from which a view is a stray: bobs look alike from behind and above."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,8 +98,7 @@ class Search:
         return self._without_strays(self.settle(self._from_uneven_turns(fit, azimuths)))
 
     def _without_strays(self, fit: Fit) -> Fit:
-        """Return the better of this solution and that from strays moved to their azimuth, at
-        the others' elevation and distance."""
+        """Return the better of this solution and that from strays moved among the other views."""
         vector = fit.vector.copy()
         views = vector[SHARED:].reshape(-1, PER_VIEW)
         stray = np.abs(views[:, 1] - np.median(views[:, 1])) > STRAY

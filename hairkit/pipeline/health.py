@@ -330,13 +330,11 @@ def assess_drawing(
     views = [compare_drawing(groom, *row) for row in zip(scene.cameras, shown, strict=True)]
     steep = groom.material.curl_radius * 2 * np.pi > groom.material.curl_pitch
     length, judged = sum(v.shown for v in views), sum(v.judged for v in views)
-    figures = []
     if not steep or slant:
         shares = [share_of(view.right, view.judged) for view in views]
         share = share_of(sum(v.right for v in views), judged)
         note = f"the hair lies otherwise than in the photos, most of all in {_worst(names, shares)}"
-        if judged > LEAST_JUDGED * length:
-            figures = [DIRECTIONS.figure(share, note)]
+        figures = [DIRECTIONS.figure(share, note)] if judged > LEAST_JUDGED * length else []
     else:
         clear = float(np.mean([view.coherence for view in views]))
         note = "the photos show strands that run side by side; set curl_radius_mm = 0 in [hair]"

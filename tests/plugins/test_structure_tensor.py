@@ -156,12 +156,11 @@ def test_lengths_follow_the_pictures_height() -> None:
     [
         Options(window_sigma=2.0, finest_window=2.0),
         Options(window_sigma=4.0, finest_window=2.0),
-        Options(gradient_scales=3, magnitude_power=2.0),
         Options(edge_sigma=0.0, noise_gain=0.0),
     ],
 )
 def test_every_setting_finds_clean_stripes(options: Options) -> None:
-    """One window, two windows, classic weights, no seam: all agree on clean stripes."""
+    """One window, two windows, no seam: all agree on clean stripes."""
     hair = patch()
     found = run(stripes(115, hair.shape), hair, options)
     error = np.degrees(angle_between(found.angle, np.radians(115)))
