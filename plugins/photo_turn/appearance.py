@@ -43,10 +43,9 @@ FACE_POINTS = np.r_[17:68]
 """iBUG points whose hull is skin: all but the jaw, which may lie under hair."""
 EYES_AND_MOUTH = (np.r_[36:42], np.r_[42:48], np.r_[48:60])
 """iBUG points of what is no skin inside."""
-CLOTHES_BAND, CLOTHES_DEPTH, CROWN_DEPTH = 0.08, 1.6, 0.25
-"""Clothes are looked for in the lowest rows of the person, a share of the picture's height, if
-these lie so many head widths below the crown: of some persons from behind hair alone is found. Hair
-is what lies above the last depth."""
+CLOTHES, CROWN_DEPTH = (1.7, 2.7), 0.25
+"""Head widths below the crown between which clothes are looked for, on the chest: lower down others
+may be worn, or the room seen. Hair is what lies above the last depth."""
 NOT_HAIR, CLOTHED = 0.18, 0.3
 """Clothes differ from hair by this much in log chromaticity, in at least this share of the band."""
 HEAD_PIXELS, LEAST_UNLIKE = 16, 0.05
@@ -219,9 +218,9 @@ def measure_clothes(photos: Sequence[UInt8Array], outlines: Sequence[Outline]) -
         colour = _log_colour(small[rows, columns])[:, :2]
         depth = (rows / scale - outline.top_px) / outline.width_px
         crown = depth <= CROWN_DEPTH
-        band = colour[rows >= rows.max() - CLOTHES_BAND * len(small)]
+        band = colour[(depth > CLOTHES[0]) & (depth < CLOTHES[1])]
         off = np.linalg.norm(band - np.median(colour[crown], axis=0), axis=1)
-        clothed = depth.max() > CLOTHES_DEPTH and (off > NOT_HAIR).mean() > CLOTHED
+        clothed = band.size and (off > NOT_HAIR).mean() > CLOTHED
         found.append(np.median(band[off > NOT_HAIR], axis=0) if clothed else np.full(2, np.nan))
     return np.array(found)
 
