@@ -35,8 +35,8 @@ SIDE_SHARE, SIDE_MOMENT = 0.55, 0.5
 """Photos of the side show at least these shares of the front's skin and of its largest moment."""
 CLOTHES_APART, CLOTHES_RATIO, CLOTHES_NOISE = 0.2, 4.5, 0.03
 """Two groups of photos show two people if their clothes differ by the first in log chromaticity,
-and by the second times the spread within the groups plus the third. The ratio is 0.4 to 2.1 in nine
-turns, and 5.9 to 19 in 36 mixtures of two people in unlike clothes."""
+and by the second times the spread within the groups plus the third. The ratio is 0.1 to 0.9 in ten
+turns, 3.6 in one whose masks take in the wall; 30 of 56 mixtures of unlike clothes are beyond."""
 CLOTHES_PALER = 0.5
 """Clothes are as pale as this share of their colour where light shines on them."""
 FEWEST_OF_ONE = 2
