@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from hairkit.pipeline import drawn_hair
-from hairkit.pipeline.drawn_hair import PhotoHair, compare_drawing, with_pieces
+from hairkit.pipeline.drawn_hair import HEIGHT, SHADE, PhotoHair, compare_drawing, with_pieces
+from hairkit.pipeline.health import assess_drawing
 from hairkit.testing import bristle_groom, turn_scene
 from hairkit.types.mask import Mask
 
@@ -29,3 +30,20 @@ def test_guides_are_compared_alike_however_many_at_a_time(
     monkeypatch.setattr(drawn_hair, "AT_ONCE", 5)
     parts = compare_drawing(with_pieces(groom), camera, shown)
     assert vars(parts) == pytest.approx(vars(whole))
+
+
+@pytest.mark.parametrize(("rows", "judged"), [(SHADE - 1, False), (HEIGHT, True)])
+def test_directions_are_judged_away_from_the_edges_of_hair(rows: int, judged: bool) -> None:
+    """A narrow band shows how the head is shaded: it has no figure of directions."""
+    scene = turn_scene()
+    random = np.random.default_rng(0)
+    shown = []
+    for camera in scene.cameras:
+        size = round(HEIGHT * camera.width / camera.height), HEIGHT
+        labels = np.zeros(size[::-1], np.uint8)
+        labels[HEIGHT // 2 - rows // 2 :][:rows] = 255
+        photo = random.integers(0, 255, (*labels.shape, 3), np.uint8)
+        shown.append(PhotoHair.of(photo, Mask(labels, True)))
+    assert any(each.judged.any() for each in shown) == judged
+    figures = assess_drawing(shown, scene, bristle_groom(), 0.0)
+    assert ("directions as photographed" in [figure.name for figure in figures]) == judged
