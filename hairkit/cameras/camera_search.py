@@ -16,7 +16,7 @@ import numpy as np
 
 from hairkit.arrays import Float64Array
 from hairkit.cameras.landmark_equations import LandmarkEquations
-from hairkit.cameras.turntable import MIN_PERSPECTIVE, PER_VIEW, PERSPECTIVE, SHARED
+from hairkit.cameras.turntable import ELEVATION, MIN_PERSPECTIVE, PER_VIEW, PERSPECTIVE, SHARED
 
 SETTLED, SETTLED_COARSELY, WORSE = 1e-3, 1e-2, 1e-9
 """Stop when the cost falls by less than the first share, the second while outlines are coarse; a
@@ -34,14 +34,13 @@ UNEVEN, SIDES = np.radians(18), 8
 phases it has."""
 UNEVEN_ROUNDS = 6
 """Rounds by which these starts are compared, with the last noise of `COARSE_TO_FINE`."""
-FAR = 4.0
-"""The search also starts from so many times the usual distance: real people who were photographed
-from some metres away ended at 4 times the cost without, at a wrong height of the camera."""
+FAR, LOW = 4.0, np.radians(-10)
+"""The search also starts from so many times the usual distance at this elevation: without, people
+photographed from metres away, by a camera at the chest, ended at a wrong height of the camera."""
 FARTHER, FARTHER_NOISE, MOST_FARTHER = 1.2, (4.0, 2.0), 6
 """Factor by which all distances are tried anew, times the noise of outlines in these rounds, and
 most steps one way. A search ends near the distance from which it starts: of 20 turns without EXIF
 the focal length was 0.7 to 1.2 of the true one, and with steps 0.9 to 1.2."""
-
 STRAY = np.radians(20)
 """Elevation off the others' from which a view is a stray: bobs look alike from behind and above."""
 
@@ -79,8 +78,8 @@ class Search:
 
     evidence: Callable[[Fit, float], Evidence]
     """The evidence at a solution, with the noise of outlines times a number."""
-    spread: Float64Array
-    """(P,) standard deviations of the prior."""
+    prior: Float64Array
+    """(P, P) inverse covariance of the prior."""
     iterations: int
     """Most rounds of Levenberg-Marquardt."""
     any_distance: bool = True
@@ -91,21 +90,25 @@ class Search:
         starts = [start]
         any_distance = self.any_distance and not start.flat
         if any_distance:
-            starts.append(_farther(start, FAR))
+            starts.append(_farther(_even(start, LOW), FAR))
         fit = _best(self.settle(each, COARSE_TO_FINE) for each in starts)
         if any_distance:
             fit = self._from_distances(fit)
-        return self._without_strays(self.settle(self._from_uneven_turns(fit, azimuths)))
+        return self._reconsidered(self.settle(self._from_uneven_turns(fit, azimuths)))
 
-    def _without_strays(self, fit: Fit) -> Fit:
-        """Return the better of this solution and that from strays moved among the other views."""
-        vector = fit.vector.copy()
-        views = vector[SHARED:].reshape(-1, PER_VIEW)
-        stray = np.abs(views[:, 1] - np.median(views[:, 1])) > STRAY
-        if not stray.any() or stray.all():
-            return fit
-        views[stray] = [0, *np.median(views[~stray, 1:], axis=0)]
-        trial = replace(fit, vector=vector, precision=1.0)
+    def _reconsidered(self, fit: Fit) -> Fit:
+        """Return the better of this solution and that from strays moved among the other views.
+
+        Without strays it is that from an even turn of low cameras.
+        """
+        views = fit.vector[SHARED:].reshape(-1, PER_VIEW).copy()
+        stray = np.abs(views[:, ELEVATION] - np.median(views[:, ELEVATION])) > STRAY
+        if stray.any() and not stray.all():
+            views[stray] = [0, *np.median(views[~stray, ELEVATION:], axis=0)]
+            trial = replace(fit, vector=np.append(fit.vector[:SHARED], views))
+        else:
+            trial = _even(fit, LOW)
+        trial = replace(trial, precision=1.0)
         return _best([fit, self.settle(trial, (*COARSE_TO_FINE, 1.0, 1.0))])
 
     def _from_distances(self, fit: Fit) -> Fit:
@@ -165,18 +168,18 @@ class Search:
 
     def cost(self, fit: Fit, seen: Evidence) -> float:
         """Return the cost of a solution by the evidence there and by the prior."""
-        prior = (fit.prior_mean - fit.vector) / self._spread(fit)
+        off = fit.prior_mean - fit.vector
         numbers = len(fit.vector) - SHARED
         # of the precision of so many deviations, without that of the deviations
         care = CARE_FREEDOM * fit.precision
         care -= (numbers + CARE_FREEDOM) * float(np.log(fit.precision))
-        return seen.cost + float(prior @ prior) + care
+        return seen.cost + float(off @ self._prior(fit) @ off) + care
 
     def _move(self, fit: Fit, seen: Evidence, damping: float) -> Float64Array:
         """Return the damped step; the perspective of orthographic cameras stays."""
-        spread = self._spread(fit)
-        normal = seen.normal + np.diag(spread**-2.0)
-        right = seen.right + (fit.prior_mean - fit.vector) / spread**2
+        prior = self._prior(fit)
+        normal = seen.normal + prior
+        right = seen.right + prior @ (fit.prior_mean - fit.vector)
         normal += damping * np.diag(np.diag(normal))
         free = np.arange(len(right))
         if fit.flat:
@@ -185,18 +188,18 @@ class Search:
         result[free] = np.linalg.solve(normal[np.ix_(free, free)], right[free])
         return result
 
-    def _spread(self, fit: Fit) -> Float64Array:
-        """Return the spread of the prior; the views' with the precision of the solution."""
-        spread = self.spread.copy()
-        spread[SHARED:] /= np.sqrt(fit.precision)
-        return spread
+    def _prior(self, fit: Fit) -> Float64Array:
+        """Return the prior's inverse covariance; the views' with the precision of the solution."""
+        prior = self.prior.copy()
+        prior[SHARED:, SHARED:] *= fit.precision
+        return prior
 
     def _with_care(self, fit: Fit, seen: Evidence) -> Fit:
         """Return the solution with the mean of the precision's posterior."""
-        covariance = np.linalg.inv(seen.normal + np.diag(self._spread(fit) ** -2.0))
-        squared = (fit.vector - fit.prior_mean) ** 2 + np.diag(covariance)
-        own = (squared / self.spread**2)[SHARED:]
-        precision = (len(own) + CARE_FREEDOM) / (float(own.sum()) + CARE_FREEDOM)
+        covariance = np.linalg.inv(seen.normal + self._prior(fit))[SHARED:, SHARED:]
+        off = (fit.vector - fit.prior_mean)[SHARED:]
+        squared = np.sum(self.prior[SHARED:, SHARED:] * (np.outer(off, off) + covariance))
+        precision = (len(off) + CARE_FREEDOM) / (float(squared) + CARE_FREEDOM)
         return replace(fit, precision=precision)
 
     def _from_uneven_turns(self, fit: Fit, azimuths: Float64Array) -> Fit:
@@ -216,6 +219,15 @@ class Search:
 
 def _best(fits: Iterable[Fit]) -> Fit:
     return min(fits, key=lambda each: each.cost)
+
+
+def _even(fit: Fit, elevation: float) -> Fit:
+    """Return the solution with all views at one elevation, upright, at one distance."""
+    vector = fit.vector.copy()
+    vector[:3] = 0
+    views = vector[SHARED:].reshape(-1, PER_VIEW)
+    views[:, ELEVATION], views[:, ELEVATION + 1 :] = elevation, 0
+    return replace(fit, vector=vector)
 
 
 def _farther(fit: Fit, times: float) -> Fit:

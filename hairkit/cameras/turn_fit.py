@@ -69,6 +69,8 @@ FOCAL_SPREAD = 0.03
 ABOVE, LOOSE_ABOVE = np.radians(35), 4.0
 """Elevation (radians) from which a view is one from above, and how much wider the spreads of its
 azimuth and elevation are: such photos belong to no turn, and show no face."""
+LEVEL = np.radians(8)
+"""Spread of the elevation of a whole turn, radians: cameras are held lower or higher than heads."""
 NEAREST = 0.2
 """Metres from a camera to the head's middle at least: nearer ones would lie in the head."""
 PLACE_ROUNDS = 4
@@ -129,7 +131,8 @@ class TurnFit:
     landmarks: LandmarkFit | None
     noise: float
     """Of outlines, pixels."""
-    prior_spread: Float64Array
+    prior: Float64Array
+    """(P, P) inverse covariance; elevations share a level."""
     focal: float | None
     """Focal length of the first view in pixels, where all views tell theirs."""
 
@@ -162,12 +165,16 @@ class TurnFit:
             )
         shared = SHARED_SPREAD if landmarks is not None else SHARED_SPREAD_BY_MASKS
         own = np.tile(each, (len(capture.views), 1))
-        own[turn.elevations > ABOVE, :2] *= LOOSE_ABOVE
-        spread = np.concatenate([shared, own.ravel()])
+        above = turn.elevations > ABOVE
+        own[above, :2] *= LOOSE_ABOVE
+        covariance = np.diag(np.concatenate([shared, own.ravel()]) ** 2)
+        own[:, 0], own[:, 1], own[:, 2:] = 0, LEVEL * ~above, 0
+        level = np.append(np.zeros(len(shared)), own)
+        covariance += np.outer(level, level)
         noise = SILHOUETTE_PX * pixel
         focals = [view.focal_px for view in capture.views]
         focal = None if None in focals else focals[0]
-        problem = cls(turn, outlines, head, landmarks, noise, spread, focal)
+        problem = cls(turn, outlines, head, landmarks, noise, np.linalg.inv(covariance), focal)
         if landmarks is None or cranium is None:
             return problem
         start = problem.cameras(problem.start(flat=False).vector)
@@ -181,7 +188,7 @@ class TurnFit:
 
     def search(self, iterations: int) -> Search:
         """Return the search for the cameras."""
-        return Search(self.evidence, self.prior_spread, iterations, self.focal is None)
+        return Search(self.evidence, self.prior, iterations, self.focal is None)
 
     def start(self, flat: bool) -> Fit:
         """Return the nominal turn, its place and magnification as landmarks or masks suggest."""

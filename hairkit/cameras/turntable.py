@@ -19,8 +19,8 @@ from hairkit.options import option
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture
 
-SHARED, PER_VIEW = 8, 6
-"""Numbers of a turn that all views share, and numbers of each view."""
+SHARED, PER_VIEW, ELEVATION = 8, 6, 1
+"""Numbers of a turn that all views share, numbers of each view, and its elevation among them."""
 CENTRE, LOG_MAGNIFICATION, PERSPECTIVE = slice(3, 6), 6, 7
 """Indices in the shared numbers: the turn's centre, log(pixels per metre there), 1 / distance."""
 ONE_SHAPE = 0.03

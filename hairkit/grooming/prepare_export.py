@@ -115,7 +115,8 @@ def complete_groom(groom: Groom) -> Groom:
     Defaults: the material's width at every point, the bound root's uv, group 0, all guides.
     """
     strands = groom.strands
-    if not any(value is None for value in _optional_values(strands)):
+    values = strands.widths, strands.root_uv, strands.group, strands.guide
+    if all(value is not None for value in values):
         return groom
     uv = strands.root_uv
     if uv is None:
@@ -128,10 +129,6 @@ def complete_groom(groom: Groom) -> Groom:
         strands, widths=widths, root_uv=uv, group=group, guide=guide_mask(strands).copy()
     )
     return replace(groom, strands=full)
-
-
-def _optional_values(strands: Strands) -> tuple[object, ...]:
-    return strands.widths, strands.root_uv, strands.group, strands.guide
 
 
 def bound_roots(groom: Groom) -> Roots:

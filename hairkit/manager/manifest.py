@@ -123,7 +123,8 @@ def _manifest(path: Path, document: Mapping[str, Any]) -> Manifest:
     module = None if command is not None else path.parent / document["module"]
     if module is not None and not module.is_file():
         raise PluginError(f"names the module {module.name}, which is not there")
-    described = {k: {"kind": _kind(v), **v} for k, v in document.get("options", {}).items()}
+    options = document.get("options", {})
+    described = {k: {"kind": type(v["default"]).__name__, **v} for k, v in options.items()}
     return Manifest(
         name,
         path,
@@ -134,7 +135,3 @@ def _manifest(path: Path, document: Mapping[str, Any]) -> Manifest:
         module,
         command,
     )
-
-
-def _kind(option: Mapping[str, Any]) -> str:
-    return type(option["default"]).__name__

@@ -92,7 +92,8 @@ def contact_sheet(
     capture: Capture, evidence: Evidence, groom: Groom, health: Sequence[Figure] = ()
 ) -> UInt8Array:
     """Return the sheet (H, W, 3) RGB that `write_contact_sheet` writes."""
-    size = _tile_size(evidence.scene.cameras)
+    first = evidence.scene.cameras[0]
+    size = TILE_WIDTH, round(TILE_WIDTH * first.height / first.width)
     photos = [_fit(view.image, size) for view in capture.views]
     cameras = [camera.resized(*size) for camera in evidence.scene.cameras]
     groom = _with_small_maps(_with_few_guides(groom))
@@ -106,10 +107,6 @@ def contact_sheet(
     )
     pictures = _arrange(rows, [view.name for view in capture.views], size)
     return np.concatenate([pictures, _health_lines(health, pictures.shape[1])])
-
-
-def _tile_size(cameras: Sequence[Camera]) -> tuple[int, int]:
-    return TILE_WIDTH, round(TILE_WIDTH * cameras[0].height / cameras[0].width)
 
 
 def _with_few_guides(groom: Groom) -> Groom:

@@ -224,12 +224,9 @@ def _evaluated(
         placed = np.einsum("pi,pij->pj", points, matrices[:, :3, :3]) + matrices[:, 3, :3]
     if not np.isfinite(placed).all():
         raise FormatError(f"{path}: transforms put a curve beyond all numbers")
-    names = [(_name(nodes, owner), _name(nodes, _parent(nodes, owner))) for owner in owners]
+    parents = [nodes[owner].parent if owner >= 0 else -1 for owner in owners]
+    names = [(_name(nodes, o), _name(nodes, p)) for o, p in zip(owners, parents, strict=True)]
     return MayaCurves(placed, counts, names, metres)
-
-
-def _parent(nodes: list[_Node], node: int) -> int:
-    return nodes[node].parent if node >= 0 else -1
 
 
 def _name(nodes: list[_Node], node: int) -> str:

@@ -130,7 +130,7 @@ def test_opposite_views_that_hold_each_other_are_moved(monkeypatch: pytest.Monke
 
     def found() -> float:
         start = np.zeros(size)
-        search = Search(evidence, np.ones(size), 20, any_distance=False)
+        search = Search(evidence, np.eye(size), 20, any_distance=False)
         fit = search.find(Fit(start, np.zeros((68, 3)), True, start), azimuths)
         return float(fit.vector[SHARED::PER_VIEW] @ off) / 2
 
@@ -156,7 +156,7 @@ def test_the_search_also_starts_from_far_away(monkeypatch: pytest.MonkeyPatch) -
     def distance() -> float:
         start = np.zeros(size)
         start[PERSPECTIVE] = 1 / 0.7
-        search = Search(evidence, np.full(size, 100.0), 20)
+        search = Search(evidence, 1e-4 * np.eye(size), 20)
         fit = search.find(Fit(start, np.zeros((68, 3)), False, start), np.arange(8) * np.pi / 4)
         return float(1 / fit.vector[PERSPECTIVE])
 
@@ -177,7 +177,7 @@ def test_steps_to_no_finite_cost_are_taken_back(beyond: float) -> None:
         return Evidence(cost, rows.T @ rows, -rows.T @ misses, None)
 
     start = np.zeros(size)
-    search = Search(evidence, np.full(size, 100.0), 20)
+    search = Search(evidence, 1e-4 * np.eye(size), 20)
     fit, _ = search.descend(Fit(start, np.zeros((68, 3)), True, start), 1.0, 20)
     assert 0.5 < fit.vector[0] < 1
     assert np.isfinite(fit.cost)
@@ -208,7 +208,7 @@ def test_nothing_is_evaluated_twice(bust: Turntable, monkeypatch: pytest.MonkeyP
     options = replace(FAST, carries=0)
     estimate_scene(bust.capture, bust.masks, bust.head, None, options)
     assert len(asked) > 10
-    assert len(asked) - len(set(asked)) <= 1  # a step may be too small to move anything
+    assert len(asked) - len(set(asked)) <= 2  # steps may be too small to move anything
 
 
 def test_options_say_how_sure_landmarks_of_files_are(bust: Turntable) -> None:
