@@ -262,7 +262,7 @@ def _gather_evidence(views: Sequence[View], outlines: Sequence[Outline | None]) 
         return Evidence.of(faces)
     seen = [views[i] for i in rows]
     photos = [view.image for view in seen]
-    check_one_person(seen, measure_clothes(photos, known))
+    check_one_person(seen, measure_clothes(seen, known))
     alike, mirrored = compare_outlines(known)
     odd = measure_oddness(known, alike, mirrored)
     skin = measure_skin(seen, known)

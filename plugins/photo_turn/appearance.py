@@ -14,7 +14,7 @@ import numpy as np
 from hairkit import View
 from hairkit.arrays import Float64Array, UInt8Array
 from hairkit.imaging.hair_network import find_hair
-from hairkit.imaging.person_outline import DEPTHS, Outline
+from hairkit.imaging.person_outline import DEPTHS, PERSON_LEVEL, Outline
 from hairkit.types.face import Face
 
 STRETCHES = np.linspace(0.85, 1.18, 9)
@@ -207,21 +207,23 @@ def _skin_moments(
     return np.array([skin.mean(), (skin * sideways).mean()])
 
 
-def measure_clothes(photos: Sequence[UInt8Array], outlines: Sequence[Outline]) -> Float64Array:
+def measure_clothes(views: Sequence[View], outlines: Sequence[Outline]) -> Float64Array:
     """Return the log chromaticity (V, 2) of the clothes, NaN where hair covers them."""
     found = []
-    for photo, outline in zip(photos, outlines, strict=True):
-        small, scale = _shrink(photo)
+    for view, outline in zip(views, outlines, strict=True):
+        small, scale = _shrink(view.image)
         size = (small.shape[1], small.shape[0])
         inside = cv2.resize(outline.inside.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
         rows, columns = np.nonzero(inside)
         colour = _log_colour(small[rows, columns])[:, :2]
         depth = (rows / scale - outline.top_px) / outline.width_px
-        crown = depth <= CROWN_DEPTH
-        band = colour[(depth > CLOTHES[0]) & (depth < CLOTHES[1])]
-        off = np.linalg.norm(band - np.median(colour[crown], axis=0), axis=1)
-        clothed = band.size and (off > NOT_HAIR).mean() > CLOTHED
-        found.append(np.median(band[off > NOT_HAIR], axis=0) if clothed else np.full(2, np.nan))
+        unlike = colour - np.median(colour[depth <= CROWN_DEPTH], axis=0)
+        worn = np.linalg.norm(unlike, axis=1) > NOT_HAIR
+        if view.person is not None and view.person.hair.size:
+            worn &= cv2.resize(view.person.hair, size)[rows, columns] <= PERSON_LEVEL
+        band = (depth > CLOTHES[0]) & (depth < CLOTHES[1])
+        clothed = band.any() and worn[band].mean() > CLOTHED
+        found.append(np.median(colour[band & worn], axis=0) if clothed else np.full(2, np.nan))
     return np.array(found)
 
 

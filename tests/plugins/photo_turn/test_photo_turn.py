@@ -343,6 +343,12 @@ def test_hair_alone_wears_no_clothes() -> None:
     assert off(find(shots), shots).max() < 45
 
 
+def test_hair_over_the_chest_is_no_shirt() -> None:
+    """Waist-long hair whose ends have another colour than the crown is still hair."""
+    shots = [replace(s, person=Person(s.person.alpha, s.person.alpha)) for s in two_people()]
+    find(shots)  # is not refused
+
+
 REFUSED = {
     "IMG_4.jpg: wears other clothes than IMG_0.jpg": two_people,
     "a copy of IMG_": copies,
