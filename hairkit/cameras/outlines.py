@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-import numpy.typing as npt
 
-from hairkit.arrays import Float32Array, Float64Array, Int64Array
+from hairkit.arrays import BoolArray, Float32Array, Float64Array, Int64Array
+from hairkit.imaging.person_outline import trace_outline
 from hairkit.types.mask import Mask
 
 FIELD_HEIGHT = 540
@@ -22,6 +22,8 @@ LEAST_SLOPE = 0.1
 """Least square of the gradient by which contour points move: it is 1 off the medial axis."""
 MASK_SIZE = cv2.DIST_MASK_5
 """Window of the chamfer distance transform."""
+HEAD_DEPTH = 1.2
+"""Height of a head in its widths with hair."""
 EDGE = 4
 """Contour points this near to the picture's edge, in field pixels, are cuts and no outline."""
 FAR = 1e5
@@ -43,74 +45,74 @@ class Outlines:
     whole: bool
     """The silhouettes are those of persons; of their hair where a mask knows no person."""
 
+    heads: Float64Array
+    """(V, 3) row of the crown, column of the head's middle and width, pixels; NaN where unknown."""
+
     @classmethod
     def of(cls, masks: Sequence[Mask], count: int) -> Outlines:
         """Return fields and about `count` contour points a view."""
-        shapes = [mask.labels.shape for mask in masks]
-        masks = _of_one_size(masks)
-        height, width = masks[0].labels.shape
+        whole = all(mask.person_known for mask in masks)
+        inside = [_person(mask) if whole else mask.hair for mask in masks]
+        heads, ends = _trace(inside)
+        rows = np.fmax(heads[:, 0] + ends * heads[:, 2], [_end(mask.hair) for mask in masks])
+        height, width = np.max([each.shape for each in inside], axis=0)
         scale = min(1.0, FIELD_HEIGHT / height)
         size = (max(1, round(width * scale)), max(1, round(height * scale)))
         fields, points = [], []
-        whole = all(mask.person_known for mask in masks)
-        for view, mask in enumerate(masks):
-            silhouette = _smooth(mask.person if whole else mask.hair, size)
-            fields.append(_signed_distance(silhouette) / scale)
-            contour = _contour(fields[-1] * scale, scale * np.array(shapes[view]), count)
-            points.append(contour / scale)
+        for each, row in zip(inside, rows, strict=True):
+            right = np.pad(each, ((0, height - len(each)), (0, width - each.shape[1])), mode="edge")
+            fields.append(_signed_distance(_smooth(right, size)) / scale)
+            seen = np.array([min(row, len(each)), each.shape[1]])
+            points.append(_contour(fields[-1] * scale, scale * seen, count) / scale)
         views = np.repeat(np.arange(len(masks)), [len(each) for each in points])
-        return cls(np.stack(fields), scale, np.concatenate(points), views, whole)
+        return cls(np.stack(fields), scale, np.concatenate(points), views, whole, heads)
 
     def arranged(self, order: Int64Array) -> Outlines:
         """Return the outlines with the views in another order."""
         mine = [np.flatnonzero(self.views == view) for view in order]
         views = np.repeat(np.arange(len(order)), [len(each) for each in mine])
         points = self.points[np.concatenate(mine)]
-        return replace(self, fields=self.fields[order], points=points, views=views)
+        fields, heads = self.fields[order], self.heads[order]
+        return replace(self, fields=fields, points=points, views=views, heads=heads)
 
     def thinned(self, every: int) -> Outlines:
         """Return the outlines with one of `every` so many contour points."""
         return replace(self, points=self.points[::every].copy(), views=self.views[::every].copy())
 
-    def crowns(self, ratio: float) -> tuple[Float64Array, Float64Array, Float64Array]:
-        """Return each silhouette's top row, and middle column and width `ratio` widths below it.
 
-        All in pixels, (V,) each.
-        """
-        found = []
-        for field in self.fields:
-            inside = field > 0
-            rows = np.nonzero(inside.any(1))[0]
-            first = inside.argmax(1)
-            last = inside.shape[1] - inside[:, ::-1].argmax(1)
-            width = (last - first)[rows]
-            deep = np.nonzero(rows - rows[0] >= ratio * width)[0]
-            row = rows[deep[deep > 2][0]] if (deep > 2).any() else rows[-1]
-            found.append((rows[0], (first[row] + last[row]) / 2, last[row] - first[row]))
-        top, middle, width = np.array(found, np.float64).T / self.scale
-        return top, middle, width
+def _person(mask: Mask) -> BoolArray:
+    """Return the piece of the person with most hair, (H, W)."""
+    _, labels = cv2.connectedComponents(mask.person.astype(np.uint8))
+    return np.asarray(labels == np.bincount(labels[mask.hair]).argmax())
 
 
-def _of_one_size(masks: Sequence[Mask]) -> Sequence[Mask]:
-    """Return masks continued to the right and below, edge pixels repeated, to the largest size."""
-    height = max(mask.labels.shape[0] for mask in masks)
-    width = max(mask.labels.shape[1] for mask in masks)
-    continued = []
-    for mask in masks:
-        more = ((0, height - mask.labels.shape[0]), (0, width - mask.labels.shape[1]))
-        if any(after for _, after in more):
-            mask = Mask(np.pad(mask.labels, more, mode="edge"), mask.person_known)
-        continued.append(mask)
-    return continued
+def _trace(silhouettes: Sequence[BoolArray]) -> tuple[Float64Array, float]:
+    """Return the heads (V, 3) of persons, and down to how many widths all of them were found.
+
+    A person stands on the picture's lower edge: below the end of a silhouette something is missing,
+    and outlines so far down are no evidence.
+    """
+    heads, depth = np.full((len(silhouettes), 3), np.nan), np.inf
+    for head, inside in zip(heads, silhouettes, strict=True):
+        outline = trace_outline(np.uint8(255) * inside)
+        if outline is not None:
+            head[:] = outline.top_px, outline.middle_px, outline.width_px
+            depth = min(depth, (_end(inside) - head[0]) / head[2])
+    return heads, max(depth, HEAD_DEPTH)
 
 
-def _smooth(silhouette: npt.NDArray[np.bool_], size: tuple[int, int]) -> npt.NDArray[np.bool_]:
+def _end(inside: BoolArray) -> int:
+    """Return the row below the last that has something inside."""
+    return int(np.nonzero(inside.any(1))[0][-1]) + 1
+
+
+def _smooth(silhouette: BoolArray, size: tuple[int, int]) -> BoolArray:
     """Shrink to the field's size, without flying hairs and with holes between hairs filled."""
     small = cv2.resize(silhouette.astype(np.float32), size, interpolation=cv2.INTER_AREA)
     return cv2.GaussianBlur(small, (0, 0), SMOOTHING_PX) > 0.5
 
 
-def _signed_distance(silhouette: npt.NDArray[np.bool_]) -> Float32Array:
+def _signed_distance(silhouette: BoolArray) -> Float32Array:
     inside = cv2.distanceTransform(silhouette.astype(np.uint8), cv2.DIST_L2, MASK_SIZE)
     outside = cv2.distanceTransform((~silhouette).astype(np.uint8), cv2.DIST_L2, MASK_SIZE)
     distance = np.where(silhouette, inside - 0.5, 0.5 - outside)

@@ -32,10 +32,11 @@ from hairkit.cameras.landmark_equations import (
 )
 from hairkit.cameras.outlines import Outlines
 from hairkit.cameras.silhouette_coherence import coherence
-from hairkit.cameras.turntable import CENTRE, LOG_MAGNIFICATION, MIN_PERSPECTIVE, PERSPECTIVE, Turn
+from hairkit.cameras.turntable import LOG_MAGNIFICATION, MIN_PERSPECTIVE, PERSPECTIVE, Turn
 from hairkit.errors import InputError
 from hairkit.head_model.cranium import Cranium
 from hairkit.imaging.masked_filters import picture_scale
+from hairkit.imaging.person_outline import MIDDLE
 from hairkit.options import option
 from hairkit.types.camera import Camera
 from hairkit.types.capture import Capture
@@ -49,9 +50,8 @@ SHARED_SPREAD = (0.05, 0.01, 0.01, 0.1, 0.2, 0.1, 0.5, 0.5)
 log of the magnification, 1 / distance."""
 SHARED_SPREAD_BY_MASKS = (0.05, 0.01, 0.01, 0.01, 0.01, 0.01, 0.05, 0.5)
 """The same where no landmark ties the turn to the head: silhouettes fit any place and size."""
-WIDEST, HAIR_THICKNESS = 0.6, 0.012
-"""Without landmarks: depth below the crown over the width there, and how far hair stands off the
-head, metres."""
+HAIR_THICKNESS = 0.012
+"""Without landmarks: how far hair stands off the head, metres."""
 SOFT = 0.3
 """A contour ray counts as missing gradually, over this many times the outline's noise."""
 SOFT_MIN = 0.3
@@ -148,8 +148,8 @@ class TurnFit:
         """Return the problem; `silhouettes` are those of the masks where they are known."""
         pixels = np.array([picture_scale(view.height) for view in capture.views])
         pixel = float(pixels.mean())
-        turn = Turn.of(capture)
         outlines, cranium = silhouettes or Silhouettes.of(masks, head, options)
+        turn = _aimed(Turn.of(capture), capture, outlines.heads)
         angles = np.radians([options.azimuth, options.elevation, options.roll])
         each = [*angles, options.distance, options.shift, options.shift]
         sights = Sights.of(capture, masks, options.landmark_px * pixels)
@@ -243,10 +243,9 @@ class TurnFit:
     def _place_by_masks(self) -> tuple[float, Float64Array]:
         """Return magnification and the turn's centre from the silhouettes' tops and widths.
 
-        A silhouette is as wide as the head with a little hair where it lies `WIDEST` of its width
-        below its top.
+        A silhouette is as wide as the head with a little hair.
         """
-        top, middle, width = self.outlines.crowns(WIDEST)
+        top, middle, width = self.outlines.heads.T
         scalp = self.head.vertices[self.head.scalp > 0.5].astype(np.float64)
         breadth = np.ptp(scalp[:, [0, 2]], axis=0).mean() + 2 * HAIR_THICKNESS
         magnification = float(np.median(width)) / breadth
@@ -307,11 +306,8 @@ class TurnFit:
     def _coherence(
         self, vector: Float64Array, cameras: CameraArrays, noise: float, every: int = 1
     ) -> tuple[Float64Array, Float64Array]:
-        rotation, translation, *_ = cameras
-        middle = np.full(len(rotation), 1 / max(float(vector[PERSPECTIVE]), MIN_PERSPECTIVE))
-        if vector[PERSPECTIVE] <= MIN_PERSPECTIVE:  # there distances are zooms, metres apart
-            middle = (rotation @ vector[CENTRE] + translation)[:, 2]
-        return coherence(self.outlines.thinned(every), *cameras, middle, SOFT_MIN * noise)
+        head = cameras[1][:, 2]
+        return coherence(self.outlines.thinned(every), *cameras, head, SOFT_MIN * noise)
 
     def residual_px(self, fit: Fit) -> float:
         """Return the root mean square misfit of landmarks and missed contour rays, pixels.
@@ -327,3 +323,15 @@ class TurnFit:
             misfit = np.append(misfit, self.landmarks.misfit(fit.offset, cameras))
             weight = np.append(weight, np.minimum(1, np.median(noise) / noise) ** 2)
         return float(np.sqrt(np.average(misfit**2, weights=weight))) if len(misfit) else 0.0
+
+
+def _aimed(turn: Turn, capture: Capture, heads: Float64Array) -> Turn:
+    """Return the turn with the cameras of cropped photos turned to the middles of heads (V, 3).
+
+    What was seen when photos were cropped may have been shoulders.
+    """
+    row, column, width = heads.T
+    usual = np.nanmedian(width / turn.focal_ratios) * turn.focal_ratios
+    middles = np.stack([column, row + MIDDLE * usual], axis=1)
+    cropped = np.array([view.cropped is not None for view in capture.views])
+    return replace(turn, aims=np.where((cropped & np.isfinite(row))[:, None], middles, turn.aims))

@@ -17,7 +17,7 @@ import numpy as np
 from hairkit.arrays import BoolArray, Float64Array, Int64Array, UInt8Array
 from hairkit.imaging.hair_features import EYES, MOUTH
 from hairkit.imaging.hair_network import hair_probability, likely_landmarks, silhouette
-from hairkit.imaging.person_outline import PERSON_LEVEL, trace_outline
+from hairkit.imaging.person_outline import MIDDLE, PERSON_LEVEL, trace_outline
 from hairkit.types.capture import Capture, View
 from hairkit.types.face import SURE_PRESENCE, Face
 from hairkit.types.framing import Framing
@@ -53,8 +53,6 @@ upper edge."""
 DEPTHS = (2.5, 3.8, 5.7)
 """Head widths from the crown to the lower edge of the frames: the first that hair crosses in half
 of the photos or fewer."""
-MIDDLE = 0.6
-"""Depth of the middle of the head below the crown, head widths."""
 CROSSING = 0.15
 """Hair crosses the lower edge where it is wider there than this, head widths."""
 WHOLE = 0.85

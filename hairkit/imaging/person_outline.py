@@ -18,6 +18,8 @@ DEPTHS = np.linspace(0.02, 1.3, 48)
 """Depths below the crown at which outlines are compared, head widths: crown to collar."""
 WIDTH_DEPTHS = (0.35, 0.7)
 """The head's width is the median between these depths, head widths."""
+MIDDLE = 0.6
+"""Depth of the middle of the head below the crown, head widths."""
 WIDTH_ROUNDS = 20
 """Most rounds until width and depths agree: they settle within five."""
 SHOULDER = 1.35

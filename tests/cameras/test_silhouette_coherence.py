@@ -126,7 +126,7 @@ def test_slopes_are_derivatives(bust: Turntable, outlines: Outlines) -> None:
 
 def test_the_crown_is_found(bust: Turntable, outlines: Outlines) -> None:
     """The top of every silhouette is where the head's highest points are seen."""
-    top, _, width = outlines.crowns(0.6)
+    top, _, width = outlines.heads.T
     for camera, row in zip(bust.cameras, top, strict=True):
         highest = camera.project(bust.head.vertices)[:, 1].min()
         assert abs(row - highest) < 5
@@ -145,6 +145,19 @@ def test_a_smaller_picture_keeps_its_pixels(bust: Turntable, outlines: Outlines)
     assert rows.max() < len(labels[0])
 
 
+def test_shoulders_that_one_mask_misses_are_no_evidence(bust: Turntable) -> None:
+    """Where one person ends at the chin, no view has contour points much farther down."""
+    labels = [mask.labels.copy() for mask in bust.masks]
+    first, middle, width = Outlines.of(bust.masks, 30).heads[2]
+    labels[2][round(first + 1.3 * width) :] = 0
+    labels[2][-20:, round(middle) :] = 128  # a piece of the person, without the head
+    cut = Outlines.of([Mask(part, True) for part in labels], 30)
+    depth = (cut.points[:, 1] - cut.heads[cut.views, 0]) / cut.heads[cut.views, 2]
+    assert depth.max() < 1.35
+    assert np.bincount(cut.views, minlength=len(labels)).min() > 20
+    assert Outlines.of(bust.masks, 30).points[:, 1].max() > first + 1.5 * width
+
+
 def test_a_picture_full_of_hair_has_no_outline() -> None:
     """A mask without an edge gives no contour points and finite distances."""
     outlines = Outlines.of([Mask(np.full((40, 30), 255, np.uint8), True)], 10)
@@ -157,7 +170,7 @@ def test_silhouettes_in_another_order_are_those_of_masks_in_that_order(bust: Tur
     order, options = np.roll(np.arange(len(bust.masks))[::-1], 2), TurnOptions()
     moved = Silhouettes.of(bust.masks, bust.head, options).arranged(order)
     wanted = Silhouettes.of(tuple(bust.masks[k] for k in order), bust.head, options)
-    for name in ("fields", "points", "views"):
+    for name in ("fields", "points", "views", "heads"):
         assert np.array_equal(getattr(moved.outlines, name), getattr(wanted.outlines, name))
     assert moved.cranium is not None
     assert wanted.cranium is not None

@@ -12,6 +12,7 @@ from turntable import Turntable, azimuth_errors, turntable
 from hairkit import Camera, Capture, Face, Mask, Scene, View
 from hairkit.cameras import camera_search
 from hairkit.cameras.camera_search import Evidence, Fit, Search
+from hairkit.cameras.outlines import Outlines
 from hairkit.cameras.turn_fit import TurnFit
 from hairkit.cameras.turntable import LOG_MAGNIFICATION, PER_VIEW, PERSPECTIVE, SHARED
 
@@ -312,3 +313,16 @@ def test_zooms_and_distances_of_orthographic_views_are_the_same(bust: Turntable)
     by_distance, _ = problem._coherence(nearer, problem.cameras(nearer), 3.0)
     by_lens, _ = problem._coherence(vector, longer, 3.0)
     assert np.abs(by_distance - by_lens).mean() < 0.1
+
+
+def test_cameras_of_cropped_photos_aim_at_the_heads_of_the_masks(bust: Turntable) -> None:
+    """A wrong middle, found before hair was, moves them nowhere; whole photos keep theirs."""
+    given = TurnFit.of(bust.capture, bust.masks, bust.head, Options()).turn.aims
+    views = [replace(v, cropped=v.frame, head=(20.0, 390.0)) for v in bust.capture.views[:3]]
+    capture = replace(bust.capture, views=(*views, *bust.capture.views[3:]))
+    aims = TurnFit.of(capture, bust.masks, bust.head, Options()).turn.aims
+    heads = Outlines.of(bust.masks, 30).heads
+    assert np.allclose(aims[:3, 0], heads[:3, 1])
+    assert (aims[:3, 1] > heads[:3, 0] + 0.5 * heads[:3, 2]).all()
+    assert (aims[:3, 1] < heads[:3, 0] + 0.7 * heads[:3, 2]).all()
+    assert np.array_equal(aims[3:], given[3:])
