@@ -44,7 +44,6 @@ class Outlines:
     """(N,) their views."""
     whole: bool
     """The silhouettes are those of persons; of their hair where a mask knows no person."""
-
     heads: Float64Array
     """(V, 3) row of the crown, column of the head's middle and width, pixels; NaN where unknown."""
 
@@ -120,10 +119,7 @@ def _signed_distance(silhouette: BoolArray) -> Float32Array:
 
 
 def _contour(field: Float32Array, shape: Float64Array, count: int) -> Float64Array:
-    """Return about `count` points (n, 2) evenly along the longest outline in a picture (2,).
-
-    Without its cut edges, and without what a smaller picture was continued by.
-    """
+    """Return about `count` points (n, 2) evenly along the longest outline within a shape (2,)."""
     outlines, _ = cv2.findContours(
         (field > 0).astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE
     )

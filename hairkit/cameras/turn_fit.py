@@ -306,8 +306,8 @@ class TurnFit:
     def _coherence(
         self, vector: Float64Array, cameras: CameraArrays, noise: float, every: int = 1
     ) -> tuple[Float64Array, Float64Array]:
-        head = cameras[1][:, 2]
-        return coherence(self.outlines.thinned(every), *cameras, head, SOFT_MIN * noise)
+        outlines, depths = self.outlines.thinned(every), cameras[1][:, 2]
+        return coherence(outlines, *cameras, depths, SOFT_MIN * noise)
 
     def residual_px(self, fit: Fit) -> float:
         """Return the root mean square misfit of landmarks and missed contour rays, pixels.
@@ -326,10 +326,7 @@ class TurnFit:
 
 
 def _aimed(turn: Turn, capture: Capture, heads: Float64Array) -> Turn:
-    """Return the turn with the cameras of cropped photos turned to the middles of heads (V, 3).
-
-    What was seen when photos were cropped may have been shoulders.
-    """
+    """Return the turn with the cameras of cropped photos aimed at the middles of heads (V, 3)."""
     row, column, width = heads.T
     usual = np.nanmedian(width / turn.focal_ratios) * turn.focal_ratios
     middles = np.stack([column, row + MIDDLE * usual], axis=1)

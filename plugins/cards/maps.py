@@ -46,9 +46,8 @@ def encode_maps(atlas: Atlas, strands: Strands, material: HairMaterial) -> dict[
         "id": lambda: (atlas.strand % SHADES).astype(np.uint8),
     }
     with ThreadPoolExecutor(thread_count()) as pool:
-        return dict(
-            zip(pictures, pool.map(lambda make: _png(make()), pictures.values()), strict=True)
-        )
+        files = pool.map(lambda make: _png(make()), pictures.values())
+        return dict(zip(pictures, files, strict=True))
 
 
 def _albedo(atlas: Atlas, strands: Strands, material: HairMaterial) -> UInt8Array:

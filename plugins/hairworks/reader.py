@@ -87,7 +87,9 @@ def _asset(
         bone_parents=_integers(fields, "boneParents", "I32", bones),
         spheres=_array(fields, "boneSpheres", "Struct", spheres),
         capsules=_integers(fields, "boneCapsuleIndices", "U32", 2 * capsules).reshape(-1, 2),
-        scene_unit=_number(fields, "sceneUnit"),
+        scene_unit=float(
+            _floats(_field(fields, "sceneUnit", "value", "F32").text, "sceneUnit", 1)[0]
+        ),
         up_axis=_whole(fields, "upAxis"),
         handedness=_whole(fields, "handedness"),
         materials=_materials(materials),
@@ -198,10 +200,6 @@ def _whole(fields: dict[str, _Element], name: str) -> int:
     if not isinstance(value, int):
         raise FormatError(f"{name} is no whole number")
     return value
-
-
-def _number(fields: dict[str, _Element], name: str) -> float:
-    return float(_floats(_field(fields, name, "value", "F32").text, name, 1)[0])
 
 
 def _array(fields: dict[str, _Element], name: str, kind: str, size: int | None) -> Float64Array:

@@ -261,7 +261,6 @@ def _gather_evidence(views: Sequence[View], outlines: Sequence[Outline | None]) 
     if len(known) < WHOLE_TURN:
         return Evidence.of(faces)
     seen = [views[i] for i in rows]
-    photos = [view.image for view in seen]
     check_one_person(seen, measure_clothes(seen, known))
     alike, mirrored = compare_outlines(known)
     odd = measure_oddness(known, alike, mirrored)
@@ -274,7 +273,7 @@ def _gather_evidence(views: Sequence[View], outlines: Sequence[Outline | None]) 
         np.nan_to_num(_spread(odd, (count,), rows)),
         None
         if len(known) < CLOSE
-        else _spread(compare_heads(photos, known), (count, count), pairs),
+        else _spread(compare_heads([view.image for view in seen], known), (count, count), pairs),
     )
 
 

@@ -203,7 +203,10 @@ class _Views:
         pairs = list(zip(scene.cameras, masks, strict=True))
         mirrored = len(pairs) if options.mode == "labels" and scene.one_sided else 0
         if mirrored:
-            pairs += [(camera.mirrored(), _mirror(mask)) for camera, mask in pairs]
+            pairs += [
+                (camera.mirrored(), replace(mask, labels=mask.labels[:, ::-1], alpha=None))
+                for camera, mask in pairs
+            ]
         views = tuple(_View.of(scene.head, camera, mask, options) for camera, mask in pairs)
         return cls(views, _forgiven_votes(scene, options), mirrored=mirrored)
 
@@ -220,10 +223,6 @@ class _Views:
     def dense(self) -> list[LabelledView]:
         """Return the views that carve the dense hull."""
         return [view.labelled(view.dense) for view in self.views]
-
-
-def _mirror(mask: Mask) -> Mask:
-    return replace(mask, labels=mask.labels[:, ::-1], alpha=None)
 
 
 def _touched_edges(mask: Mask) -> tuple[bool, bool, bool, bool]:
