@@ -17,7 +17,7 @@ from hairkit.cameras.outlines import Outlines
 from hairkit.parallel import compiled, compiled_with, parallel_for
 
 REACH = 0.28
-"""Rays are searched this far before and behind the turn's centre, metres: heads are smaller."""
+"""Rays are searched this far before and behind the head's origin, metres: heads are smaller."""
 STEPS = (0.03, 0.0015)
 """Steps of two searches along a ray, metres: the second passes over what cannot beat the first."""
 FINE = 3
@@ -64,7 +64,7 @@ def coherence(
     rotation, translation, focal, centre
         Cameras (V, 3, 3), (V, 3), (V,), (V, 2).
     middle
-        (V,) depth of the turn's centre in each view, metres.
+        (V,) depth of the head's origin in each view, metres.
     softness
         Of the minimum over silhouettes, pixels: less than the outlines' noise.
 
@@ -107,7 +107,7 @@ class _Views(NamedTuple):
     centre: Float64Array
     """(V, 2) principal points, pixels."""
     middle: Float64Array
-    """(V,) depth of the turn's centre in each view, metres."""
+    """(V,) depth of the head's origin in each view, metres."""
     softness: float
     """Of the minimum over silhouettes, pixels."""
 

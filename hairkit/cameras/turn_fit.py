@@ -306,8 +306,7 @@ class TurnFit:
     def _coherence(
         self, vector: Float64Array, cameras: CameraArrays, noise: float, every: int = 1
     ) -> tuple[Float64Array, Float64Array]:
-        outlines, depths = self.outlines.thinned(every), cameras[1][:, 2]
-        return coherence(outlines, *cameras, depths, SOFT_MIN * noise)
+        return coherence(self.outlines.thinned(every), *cameras, cameras[1][:, 2], SOFT_MIN * noise)
 
     def residual_px(self, fit: Fit) -> float:
         """Return the root mean square misfit of landmarks and missed contour rays, pixels.

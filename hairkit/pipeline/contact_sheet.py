@@ -60,6 +60,8 @@ KEY, SKY, GROUND = (1.3, 1.26, 1.2), (1.15, 1.15, 1.17), (0.72, 0.71, 0.7)
 photos of evenly lit rooms."""
 EXPOSURE = 0.68
 """Factor of all light in these pictures."""
+_STUDIO = Lights.studio(KEY_DIRECTION, RIM_DIRECTION, EXPOSURE)
+LIGHTS = replace(_STUDIO, key_colour=KEY, rim_colour=KEY, sky_colour=SKY, ground_colour=GROUND)
 LOOK = SkinLook(mean_free_path=(0.0, 0.0, 0.0))
 """Skin that scatters no light sideways: a pixel is as wide as light goes in the flesh."""
 PAPER, INK = 250, 60
@@ -94,8 +96,8 @@ def contact_sheet(
     """Return the sheet (H, W, 3) RGB that `write_contact_sheet` writes."""
     first = evidence.scene.cameras[0]
     size = TILE_WIDTH, round(TILE_WIDTH * first.height / first.width)
-    photos = [_fit(view.image, size) for view in capture.views]
-    cameras = [camera.resized(*size) for camera in evidence.scene.cameras]
+    photos = [_fit(view.image, size, PAPER) for view in capture.views]
+    cameras = [camera.fitted(*size) for camera in evidence.scene.cameras]
     groom = _with_small_maps(_with_few_guides(groom))
     rows = (
         photos,
@@ -124,8 +126,15 @@ def _with_small_maps(groom: Groom) -> Groom:
     return replace(groom, head=replace(groom.head, maps=replace(groom.head.maps, **fine)))
 
 
-def _fit(image: npt.NDArray[np.uint8], size: tuple[int, int]) -> UInt8Array:
-    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
+def _fit(image: npt.NDArray[np.uint8], size: tuple[int, int], around: int = 0) -> UInt8Array:
+    """Return the whole picture in the middle of one of a width and height, one grey around."""
+    scale = min(size[0] / image.shape[1], size[1] / image.shape[0])
+    inner = round(scale * image.shape[1]), round(scale * image.shape[0])
+    left, top = (np.array(size) - inner) // 2
+    result = np.full((size[1], size[0], *image.shape[2:]), around, np.uint8)
+    part = result[top : top + inner[1], left : left + inner[0]]
+    part[:] = cv2.resize(image, inner, interpolation=cv2.INTER_AREA)
+    return result
 
 
 def mask_picture(photo: UInt8Array, mask: Mask) -> UInt8Array:
@@ -141,9 +150,8 @@ def mask_picture(photo: UInt8Array, mask: Mask) -> UInt8Array:
 
 def _hsv_picture(map_: OrientationMap, size: tuple[int, int]) -> UInt8Array:
     """Return hue for the angle and brightness for the confidence."""
-    fine = (2 * size[0], 2 * size[1])
-    angle = cv2.resize(map_.angle, fine, interpolation=cv2.INTER_NEAREST)
-    sure = np.sqrt(cv2.resize(map_.confidence, fine, interpolation=cv2.INTER_NEAREST))
+    every = max(1, map_.angle.shape[1] // (2 * size[0]))
+    angle, sure = map_.angle[::every, ::every], np.sqrt(map_.confidence[::every, ::every])
     hsv = np.stack([angle * (180 / np.pi), np.full_like(angle, 200), sure * 255], axis=-1)
     rgb = cv2.cvtColor(hsv.astype(np.uint8), cv2.COLOR_HSV2RGB)
     return _fit(np.asarray(rgb, np.uint8), size)
@@ -193,17 +201,10 @@ def _hair_pictures(groom: Groom, cameras: Sequence[Camera]) -> list[UInt8Array]:
         groom.head,
         cameras,
         material=groom.material,
-        lights=_lights(),
+        lights=LIGHTS,
         bust=True,
         skin=LOOK,
     )
-
-
-def _lights() -> Lights:
-    """Return lights from front and back alike, under a bright sky: photos go around, and are taken
-    in rooms rather than in a studio's light."""
-    lights = Lights.studio(KEY_DIRECTION, RIM_DIRECTION, EXPOSURE)
-    return replace(lights, key_colour=KEY, rim_colour=KEY, sky_colour=SKY, ground_colour=GROUND)
 
 
 def _arrange(

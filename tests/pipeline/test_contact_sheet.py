@@ -42,6 +42,17 @@ def test_the_sheet_shows_every_stage_of_every_view(
     assert (np.asarray(stored)[..., ::-1] == sheet).all()
 
 
+def test_a_narrow_photo_is_not_stretched() -> None:
+    """A round head stays round, in the middle of its tile, with paper beside the photo."""
+    photo = cv2.circle(np.zeros((400, 200, 3), np.uint8), (100, 200), 90, (180, 180, 180), -1)
+    tile = sheets._fit(photo, (160, 120), sheets.PAPER)[..., 0]
+    rows, columns = np.nonzero((tile > 90) & (tile < sheets.PAPER))
+    assert np.ptp(rows) == pytest.approx(np.ptp(columns), abs=1)
+    assert rows.mean() == pytest.approx(59.5, abs=1)
+    assert columns.mean() == pytest.approx(79.5, abs=1)
+    assert (tile[:, :45] == sheets.PAPER).all()
+
+
 def test_the_hue_tells_the_angle() -> None:
     """Strands at a right angle to each other have opposite hues, uncertain ones are dark."""
     camera = turn_scene().cameras[0]
