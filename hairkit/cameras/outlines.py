@@ -22,8 +22,8 @@ LEAST_SLOPE = 0.1
 """Least square of the gradient by which contour points move: it is 1 off the medial axis."""
 MASK_SIZE = cv2.DIST_MASK_5
 """Window of the chamfer distance transform."""
-HEAD_DEPTH = 1.2
-"""Height of a head in its widths with hair."""
+HEAD_DEPTH, BARE = 1.2, 0.05
+"""Height of a head in its widths with hair; what a pixel without hair weighs beside one with."""
 EDGE = 4
 """Contour points this near to the picture's edge, in field pixels, are cuts and no outline."""
 FAR = 1e5
@@ -80,16 +80,16 @@ class Outlines:
 
 
 def _person(mask: Mask) -> BoolArray:
-    """Return the piece of the person with most hair, (H, W)."""
+    """Return the piece of the person with most hair, (H, W); the largest of a bald one."""
     _, labels = cv2.connectedComponents(mask.person.astype(np.uint8))
-    return np.asarray(labels == np.bincount(labels[mask.hair]).argmax())
+    weight = np.where(mask.hair, 1.0, BARE)[mask.person]
+    return np.asarray(labels == np.bincount(labels[mask.person], weight).argmax())
 
 
 def _trace(silhouettes: Sequence[BoolArray]) -> tuple[Float64Array, float]:
     """Return the heads (V, 3) of persons, and down to how many widths all of them were found.
 
-    A person stands on the picture's lower edge: below the end of a silhouette something is missing,
-    and outlines so far down are no evidence.
+    Persons stand on the picture's lower edge: below the end of a silhouette something is missing.
     """
     heads, depth = np.full((len(silhouettes), 3), np.nan), np.inf
     for head, inside in zip(heads, silhouettes, strict=True):

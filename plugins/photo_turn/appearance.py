@@ -212,7 +212,7 @@ def measure_clothes(views: Sequence[View], outlines: Sequence[Outline]) -> Float
     found = []
     for view, outline in zip(views, outlines, strict=True):
         small, scale = _shrink(view.image)
-        size = (small.shape[1], small.shape[0])
+        size = small.shape[1::-1]
         inside = cv2.resize(outline.inside.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST)
         rows, columns = np.nonzero(inside)
         colour = _log_colour(small[rows, columns])[:, :2]
