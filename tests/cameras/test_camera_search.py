@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hairkit.cameras.camera_search import Evidence, Fit, Search
-from hairkit.cameras.turntable import PER_VIEW, SHARED
+from hairkit.cameras.turntable import ELEVATION, PER_VIEW, SHARED
 
 FALSE, STIFFNESS, DEARER = 0.8, 1e4, 50.0
 """Elevation of the false minimum, radians, how narrow both minima are, and its cost."""
@@ -13,11 +13,11 @@ FALSE, STIFFNESS, DEARER = 0.8, 1e4, 50.0
 
 def two_minima(fit: Fit, noise: float) -> Evidence:
     """Return the evidence of the first view's elevation: 0, or `FALSE` from half of it on."""
-    at = fit.vector[SHARED + 1]
+    at = fit.vector[SHARED + ELEVATION]
     nearer = FALSE if at > FALSE / 2 else 0.0
     normal, right = np.zeros((len(fit.vector),) * 2), np.zeros(len(fit.vector))
-    normal[SHARED + 1, SHARED + 1] = STIFFNESS
-    right[SHARED + 1] = STIFFNESS * (nearer - at)
+    normal[SHARED + ELEVATION, SHARED + ELEVATION] = STIFFNESS
+    right[SHARED + ELEVATION] = STIFFNESS * (nearer - at)
     cost = STIFFNESS * (nearer - at) ** 2 + (DEARER if nearer else 0.0)
     return Evidence(cost, normal, right, None)
 
@@ -26,12 +26,12 @@ def test_a_view_far_above_the_others_is_tried_level() -> None:
     """From the false minimum of one view of three the search comes to the true one."""
     vector = np.zeros(SHARED + 3 * PER_VIEW)
     start = Fit(vector.copy(), np.zeros((68, 3)), True, vector.copy())
-    start.vector[SHARED + 1] = FALSE
+    start.vector[SHARED + ELEVATION] = FALSE
     search = Search(two_minima, 400 * np.eye(len(vector)), 20, any_distance=False)
     held = search.settle(start)
-    assert held.vector[SHARED + 1] > 0.7
+    assert held.vector[SHARED + ELEVATION] > 0.7
     found = search.find(start, np.zeros(3))
-    assert abs(found.vector[SHARED + 1]) < 0.01
+    assert abs(found.vector[SHARED + ELEVATION]) < 0.01
 
 
 def test_turns_held_above_are_tried_from_below() -> None:
@@ -41,7 +41,7 @@ def test_turns_held_above_are_tried_from_below() -> None:
     def evidence(fit: Fit, noise: float) -> Evidence:
         """Return the cost of the mean elevation: least at `low`, with a false minimum at 0.1."""
         raised = np.zeros(len(fit.vector))
-        raised[SHARED + 1 :: PER_VIEW] = 1 / 8
+        raised[SHARED + ELEVATION :: PER_VIEW] = 1 / 8
         nearer = 0.1 if fit.vector @ raised > -0.05 else low
         off = fit.vector @ raised - nearer
         cost = STIFFNESS * off**2 + (DEARER if nearer > 0 else 0.0)
@@ -51,6 +51,6 @@ def test_turns_held_above_are_tried_from_below() -> None:
     start = np.zeros(SHARED + 8 * PER_VIEW)
     search = Search(evidence, 25 * np.eye(len(start)), 20, any_distance=False)
     fit = Fit(start, np.zeros((68, 3)), True, start)
-    assert search.settle(fit).vector[SHARED + 1] > 0.05
-    found = search.find(fit, np.arange(8) * np.pi / 4).vector[SHARED + 1 :: PER_VIEW]
+    assert search.settle(fit).vector[SHARED + ELEVATION] > 0.05
+    found = search.find(fit, np.arange(8) * np.pi / 4).vector[SHARED + ELEVATION :: PER_VIEW]
     assert abs(found.mean() - low) < 0.02
